@@ -1,0 +1,41 @@
+"""Soft helical filaments swimming at low Reynolds number: discrete elastic rods in Stokes flow."""
+
+from flagrs import contact, fluid, scenarios
+from flagrs.errors import ConvergenceError, FlagrsError, SceneError
+from flagrs.scene import (
+    Clamp,
+    Contact,
+    Fluid,
+    Head,
+    Material,
+    Motor,
+    PointLoad,
+    Rod,
+    Scene,
+    Table,
+)
+from flagrs.simulation import Simulation
+from flagrs.trajectory import Trajectory
+from flagrs.units import rpm
+
+__all__ = [
+    "Clamp",
+    "Contact",
+    "ConvergenceError",
+    "FlagrsError",
+    "Fluid",
+    "Head",
+    "Material",
+    "Motor",
+    "PointLoad",
+    "Rod",
+    "Scene",
+    "SceneError",
+    "Simulation",
+    "Table",
+    "Trajectory",
+    "contact",
+    "fluid",
+    "rpm",
+    "scenarios",
+]

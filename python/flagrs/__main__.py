@@ -1,0 +1,5 @@
+"""``python -m flagrs``: the command line."""
+
+from flagrs.cli import main
+
+main()

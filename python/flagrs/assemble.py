@@ -1,0 +1,214 @@
+"""From a scene to the plain arrays of the native core: one global numbering of nodes, edges and hinges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from flagrs.errors import SceneError
+from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology
+from flagrs.scene.signal import Signal
+from flagrs.scene.values import BoolArray, FloatArray, IntArray
+
+#: Excluded rest arc length over the sum of radii where a contact gives none; see docs/theory/contact.md.
+EXCLUSION_FACTOR = math.pi / 2.0
+
+
+def native_scene(scene: Scene) -> dict[str, Any]:
+    """Return the mapping that ``_flagrs.Simulation`` takes.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        Arrays over all rods, in the scene's global numbering, SI units.
+    """
+    rods = scene.rods
+    edges = [rod.edge_array() + scene.node_offset(k) for k, rod in enumerate(rods)]
+    hinges = [rod.hinge_array() + scene.edge_offset(k) for k, rod in enumerate(rods)]
+    return {
+        "nodes": scene.node_array(),
+        "rest_nodes": np.concatenate([rod.rest_array() for rod in rods]),
+        "edges": np.concatenate(edges),
+        "hinges": np.concatenate(hinges),
+        "theta": np.concatenate([_theta(rod) for rod in rods]),
+        "directors": _directors(scene),
+        "radius": np.concatenate([rod.radius_array() for rod in rods]),
+        "density": np.concatenate([rod.density_array() for rod in rods]),
+        "stretching": np.concatenate([rod.EA_array() for rod in rods]),
+        "bending": np.concatenate([rod.EI_array() for rod in rods]),
+        "twisting": np.concatenate([rod.GJ_array() for rod in rods]),
+        "natural_curvature": np.concatenate([_natural_curvature(rod) for rod in rods]),
+        "natural_twist": np.concatenate([_natural_twist(rod) for rod in rods]),
+        "motors": [_motor(scene, motor) for motor in scene.motors],
+        "head": None if scene.head is None else _head(scene, scene.head),
+        "clamps": [_clamp(scene, clamp) for clamp in scene.clamps],
+        "loads": [(scene.node_offset(load.rod) + load.node, load.force.tolist()) for load in scene.loads],
+        "gravity": scene.gravity.tolist(),
+        "fluid": None if scene.fluid is None else _fluid(scene, scene.fluid),
+        "contact": None if scene.contact is None else _contact(scene, scene.contact),
+    }
+
+
+def _theta(rod: Rod) -> FloatArray:
+    return np.zeros(len(rod.edge_array())) if rod.theta is None else rod.theta
+
+
+def _natural_curvature(rod: Rod) -> FloatArray:
+    shape = (len(rod.hinge_array()), 2)
+    given = np.nan if rod.natural_curvature is None else rod.natural_curvature
+    return np.broadcast_to(given, shape).astype(np.float64)
+
+
+def _natural_twist(rod: Rod) -> FloatArray:
+    given = np.nan if rod.natural_twist is None else rod.natural_twist
+    return np.broadcast_to(given, len(rod.hinge_array())).astype(np.float64)
+
+
+def _directors(scene: Scene) -> list[tuple[int, list[float]]]:
+    given = [(scene.edge_offset(k), rod.director) for k, rod in enumerate(scene.rods)]
+    return [(edge, director.tolist()) for edge, director in given if director is not None]
+
+
+def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[[float], float]:
+    if isinstance(signal, Table):
+        return np.array(signal.times), np.array(signal.values)
+    return signal
+
+
+def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
+    rod = scene.rods[motor.rod]
+    hinge, second = hinge_of_motor(rod, motor)
+    offset = sum(len(other.hinge_array()) for other in scene.rods[: motor.rod])
+    return {
+        "hinge": offset + hinge,
+        "shaft_second": second,
+        "by_torque": motor.drive == "torque",
+        "signal": _signal(motor.signal),
+    }
+
+
+def hinge_of_motor(rod: Rod, motor: Motor) -> tuple[int, bool]:
+    """Return the hinge at which a motor sits, and whether its shaft is the hinge's second edge.
+
+    Raises
+    ------
+    SceneError
+        If there is not exactly one hinge at the motor's node that bends its shaft.
+    """
+    edges, hinges = rod.edge_array(), rod.hinge_array()
+    found = [
+        (k, pair[1] == motor.shaft)
+        for k, pair in enumerate(hinges.tolist())
+        if motor.shaft in pair and rod_topology.shared_node(edges, *pair) == motor.node
+    ]
+    if len(found) != 1:
+        raise SceneError(
+            f"motors: node {motor.node} has {len(found)} hinges with shaft edge {motor.shaft}; must be one",
+            field="motors",
+            value=motor.node,
+            allowed="a node with exactly one hinge that bends the shaft edge",
+        )
+    return found[0]
+
+
+def _head(scene: Scene, head: Head) -> dict[str, Any]:
+    viscosity = 0.0 if scene.fluid is None else scene.fluid.viscosity
+    before, after = head_neighbours(scene.rods[head.rod], head)
+    offset = scene.node_offset(head.rod)
+    return {
+        "node": offset + head.node,
+        "neighbours": [offset + before, offset + after],
+        "translation": head.C_t * 6.0 * math.pi * viscosity * head.radius,
+        "rotation": head.C_r * 8.0 * math.pi * viscosity * head.radius**3,
+        "mass": head.mass,
+    }
+
+
+def head_neighbours(rod: Rod, head: Head) -> tuple[int, int]:
+    """Return the two nodes next to the head's node, in the order of the rod's edges."""
+    neighbours = [
+        rod_topology.far_end(rod.edge_array(), edge, head.node)
+        for edge, pair in enumerate(rod.edge_array().tolist())
+        if head.node in pair
+    ]
+    return neighbours[0], neighbours[1]
+
+
+def _clamp(scene: Scene, clamp: Clamp) -> dict[str, Any]:
+    nodes, edges = scene.node_offset(clamp.rod), scene.edge_offset(clamp.rod)
+    return {
+        "nodes": [nodes + node for node in clamp.nodes],
+        "edges": [edges + edge for edge in clamp.edges],
+        "angular_velocity": _signal(clamp.angular_velocity),
+        "velocity": clamp.velocity.tolist(),
+    }
+
+
+def _fluid(scene: Scene, fluid: Fluid) -> dict[str, Any]:
+    radius = np.concatenate([rod.radius_array() for rod in scene.rods])
+    immersed: BoolArray = np.concatenate([rod.immersed_array() for rod in scene.rods])
+    local = fluid.model == "RFT"
+    return {
+        "viscosity": fluid.viscosity,
+        "immersed": (immersed & (fluid.model != "none")).tolist(),
+        "twist_drag": fluid.twist_drag,
+        "density": fluid.density,
+        "epsilon": None if local else fluid.epsilon_array(radius),
+        "coefficients": resistive_coefficients(scene, fluid) if local else None,
+    }
+
+
+def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
+    """Return drag per length along and across every edge (E, 2) [N s/m^2].
+
+    Gray and Hancock (1955): ``2 pi mu / (ln(2 lambda/a) - 1/2)`` and ``4 pi mu / (ln(2 lambda/a) + 1/2)`` with the
+    wavelength ``lambda``. Lighthill (1976): ``2 pi mu / ln(2 q/a)`` and ``4 pi mu / (ln(2 q/a) + 1/2)`` with
+    ``q = 0.09`` times the arc length of a wavelength. Where the fluid gives no wavelength, the immersed length of
+    the rod stands for it.
+    """
+    rows = []
+    for rod in scene.rods:
+        contour = float(rod.rest_lengths()[rod.immersed_array()].sum())
+        wavelength = contour if fluid.wavelength is None else fluid.wavelength
+        radius = rod.radius_array()
+        if fluid.coefficients == "gray-hancock":
+            logarithm = np.log(2.0 * wavelength / radius)
+            along = 2.0 * np.pi * fluid.viscosity / (logarithm - 0.5)
+        else:
+            logarithm = np.log(2.0 * 0.09 * wavelength / radius)
+            along = 2.0 * np.pi * fluid.viscosity / logarithm
+        across = 4.0 * np.pi * fluid.viscosity / (logarithm + 0.5)
+        rows.append(np.stack([along, across], axis=1))
+    coefficients: FloatArray = np.concatenate(rows)
+    if not (coefficients > 0.0).all():
+        raise SceneError(
+            "fluid.wavelength: too short for the radius; resistive force theory needs slender filaments",
+            field="fluid.wavelength",
+            value=fluid.wavelength,
+            allowed="many radii [m]",
+        )
+    return coefficients
+
+
+def _contact(scene: Scene, contact: Contact) -> dict[str, Any]:
+    return {
+        "tolerance": contact.tolerance,
+        "max_iterations": contact.max_iterations,
+        "exclusion": EXCLUSION_FACTOR if contact.exclusion_factor is None else contact.exclusion_factor,
+        "colliding": np.concatenate([rod.colliding_array() for rod in scene.rods]).tolist(),
+    }
+
+
+def edges_of(scene: Scene) -> IntArray:
+    """Return start and end node (E, 2) of every edge of the scene."""
+    rods = enumerate(scene.rods)
+    edges: IntArray = np.concatenate([rod.edge_array() + scene.node_offset(k) for k, rod in rods])
+    return edges

@@ -1,0 +1,208 @@
+"""The command ``flagrs``: run scenes, draw them, repeat the studies, check the installation."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.table import Table as TextTable
+
+from flagrs import scenarios
+from flagrs.errors import FlagrsError, SceneError
+from flagrs.progress import ProgressBar
+from flagrs.runs import Run, RunSettings, measured, run_to_file
+from flagrs.scene import Scene, toml
+from flagrs.trajectory import Trajectory
+from flagrs.units import rpm
+
+app = typer.Typer(
+    help="Soft helical filaments swimming at low Reynolds number.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+
+#: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
+BAD_INPUT, FAILED = 2, 1
+
+
+@app.command("scenarios")
+def list_scenarios() -> None:
+    """List the scenes that can be run by name, with their parameters."""
+    table = TextTable("scenario", "what it is", "parameters and defaults")
+    for name, summary in scenarios.list().items():
+        options = ", ".join(f"{key}={value!r}" for key, value in scenarios.parameters(name).items())
+        table.add_row(name, summary, options)
+    Console().print(table)
+
+
+@app.command()
+def run(
+    scene: Annotated[str, typer.Argument(help="A TOML file, or the name of a scenario.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="HDF5 file; by default NAME.h5.")
+    ] = None,
+    until: Annotated[float, typer.Option(help="Simulated time to run to [s].")] = 10.0,
+    save_every: Annotated[float, typer.Option(help="Simulated time between frames [s].")] = 0.1,
+    scheme: Annotated[str, typer.Option(help="Scheme in time.")] = "overdamped",
+    dt: Annotated[float | None, typer.Option(help="Time step [s].")] = None,
+    threads: Annotated[int | None, typer.Option(help="Threads; else FLAGRS_THREADS.")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Parameter or field to change, such as rpm=30; repeatable."),
+    ] = None,
+    figure: Annotated[Path | None, typer.Option(help="Image file for a figure of the run.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Start anew, replacing an earlier run.")] = False,
+    plan: Annotated[bool, typer.Option("--plan", help="Only say what would run and what it costs.")] = False,
+) -> None:
+    """Run a scene into a file; an interrupted run goes on where it was."""
+    described = scene_from(scene, changes or [])
+    if plan:
+        typer.echo(described.plan())
+        return
+    path = output or Path(f"{described.name}.h5")
+    settings = RunSettings(until=until, save_every=save_every, scheme=scheme, dt=dt, threads=threads)
+    for warning in described.plan().warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    with ProgressBar(until, described.name, hidden=not sys.stderr.isatty()) as progress:
+        done = run_to_file(described, path, settings, fresh=fresh, progress=progress)
+    typer.echo(_report(done, path))
+    if figure is not None:
+        _draw(done.trajectory, figure)
+
+
+@app.command()
+def plot(
+    file: Annotated[Path, typer.Argument(help="HDF5 file of a run, finished or not.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Image; by default FILE.png.")] = None,
+) -> None:
+    """Draw speed, head rate and shape of a run."""
+    _draw(Trajectory.load(file), output or file.with_suffix(".png"))
+
+
+@app.command()
+def study(
+    which: Annotated[Literal["convergence", "geometries"], typer.Argument(help="The study.")],
+    directory: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for runs and results.")
+    ] = None,
+    duration: Annotated[float, typer.Option(help="Simulated time of each run [s].")] = 100.0,
+    dt: Annotated[float | None, typer.Option(help="Time step [s].")] = None,
+    scheme: Annotated[str, typer.Option(help="Scheme in time.")] = "overdamped",
+    processes: Annotated[
+        int | None, typer.Option(help="Worker processes; by default one per processor.")
+    ] = None,
+) -> None:
+    """Repeat a study of the supplementary text: speed against rpm, for meshes or for geometries."""
+    from flagrs import study as studies  # the other commands do without
+
+    carry_out = studies.convergence if which == "convergence" else studies.geometries
+    result = carry_out(
+        directory or Path("flagrs-runs") / which, duration=duration, dt=dt, scheme=scheme, processes=processes
+    )
+    _print_rows(result.rows)
+    typer.echo(f"{len(result.rows)} runs in {result.wall_seconds:.1f} s: {result.table}, {result.figure}")
+    failed = [row for row in result.rows if row["error"]]
+    for row in failed:
+        typer.echo(f"failed: {row['file']}: {row['error']}", err=True)
+    if failed:
+        raise typer.Exit(FAILED)
+
+
+@app.command()
+def doctor() -> None:
+    """Say what this installation is made of, and try it."""
+    from flagrs import doctor as examination  # the other commands do without
+
+    for name, value in examination.report().items():
+        typer.echo(f"{name:<18}{value}")
+    typer.echo(f"{'smoke run':<18}{examination.smoke_run()}")
+
+
+def scene_from(name: str, changes: Sequence[str]) -> Scene:
+    """Return the scene of a TOML file or a scenario, with changes of the form ``key=value``.
+
+    Raises
+    ------
+    SceneError
+        If there is no such file or scenario, or a change is not allowed.
+    """
+    options = dict(_change(text) for text in changes)
+    path = Path(name)
+    if path.suffix != ".toml":
+        return scenarios.build(name, toml.changed({}, options))
+    if not path.exists():
+        raise SceneError(f"{name}: no such file", field="scene", value=name)
+    return toml.read(path, options)
+
+
+def _change(text: str) -> tuple[str, Any]:
+    """Return key and value of ``key=value``; the value is TOML, or a plain word."""
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise SceneError(f"--set {text}: must be of the form key=value", field="--set", value=text)
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value
+
+
+def _report(done: Run, path: Path) -> str:
+    trajectory = done.trajectory
+    values = measured(trajectory)
+    simulated = float(trajectory.time[-1]) if len(trajectory) else 0.0
+    lines = []
+    if done.skipped:
+        lines.append(f"{path} holds this run already, finished; --fresh repeats it")
+    if done.resumed_at is not None:
+        lines.append(f"went on from t = {done.resumed_at:g} s")
+    if values["swimming_speed"] is not None:
+        lines.append(f"swimming speed    {1e3 * values['swimming_speed']:.4g} mm/s")
+    if values["head_rate"] is not None:
+        lines.append(f"head rate         {values['head_rate'] / rpm(1.0):.4g} rpm")
+    if values["efficiency"] is not None:
+        lines.append(f"efficiency        {100 * values['efficiency']:.3g} %")
+    wall = trajectory.wall_seconds
+    factor = f", {simulated / wall:.3g} times real time" if wall > 0.0 else ""
+    lines.append(f"wall time         {wall:.3g} s for {simulated:g} s simulated{factor}")
+    lines.append(f"saved             {path} ({len(trajectory)} frames)")
+    return "\n".join(lines)
+
+
+def _draw(trajectory: Trajectory, path: Path) -> None:
+    from flagrs import plot as figures  # the command of this name hides the module
+
+    figures.summary(trajectory).savefig(path, dpi=150)
+    typer.echo(f"drawn             {path}")
+
+
+def _print_rows(rows: Sequence[dict[str, Any]]) -> None:
+    table = TextTable("pitch / R", "nodes", "rpm", "speed [mm/s]", "head [rpm]", "wall [s]")
+    for row in rows:
+        speed, head = row["swimming_speed"], row["head_rate"]
+        table.add_row(
+            f"{row['normalized_pitch']:g}",
+            str(row["nodes"]),
+            f"{row['rpm']:g}",
+            "failed" if speed is None else f"{1e3 * speed:.4f}",
+            "" if head is None else f"{head / rpm(1.0):.4f}",
+            f"{row['wall_seconds']:.1f}",
+        )
+    Console().print(table)
+
+
+def main() -> None:
+    """Run the command line; errors of the user's making end it with one clean message and no traceback."""
+    try:
+        app()
+    except SceneError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(BAD_INPUT)
+    except (FlagrsError, OSError) as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(FAILED)

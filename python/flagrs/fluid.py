@@ -1,0 +1,160 @@
+"""The fluid's numerics on plain arrays: regularized Stokeslet segments."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flagrs import _flagrs
+from flagrs.errors import SceneError
+from flagrs.scene.values import FloatArray, IntArray
+
+__all__ = ["hat_weights", "mobility", "velocity"]
+
+
+def mobility(
+    nodes: Any, edges: Any, epsilon: Any, targets: Any = None, threads: int | None = None
+) -> FloatArray:
+    """Return the matrix A with ``8 pi mu u = A f`` for nodal force densities f.
+
+    Parameters
+    ----------
+    nodes
+        Positions (N, 3) of the nodes [m].
+    edges
+        Start and end node (E, 2) of each segment.
+    epsilon
+        Regularization, one or (E,) [m].
+    targets
+        Points (M, 3) at which the velocity is taken [m]; None: the nodes.
+    threads
+        Threads to use; None: ``FLAGRS_THREADS``, else all.
+
+    Returns
+    -------
+    ndarray
+        A (3M, 3N) [m]; rows are target components, columns node components. By collocation it is not symmetric.
+
+    Raises
+    ------
+    SceneError
+        For arrays of the wrong shape, indices out of range, or a regularization that is not positive.
+
+    Notes
+    -----
+    Cortez (2018), doi:10.1016/j.jcp.2018.08.055; docs/theory/fluid.md, equations 12 to 14. Each 3x3 block is exact to
+    1e-12.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> nodes = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    >>> mobility(nodes, [[0, 1], [1, 2]], epsilon=0.1).shape
+    (9, 9)
+    """
+    points, pairs, widths = _segments(nodes, edges, epsilon)
+    at = points if targets is None else _vectors("targets", targets)
+    return _flagrs.mobility(points, pairs, widths, at, _flagrs.thread_count(threads))
+
+
+def velocity(
+    points: Any,
+    nodes: Any,
+    edges: Any,
+    force_density: Any,
+    viscosity: float,
+    epsilon: Any,
+    threads: int | None = None,
+) -> FloatArray:
+    """Return the velocity of the fluid at points.
+
+    Parameters
+    ----------
+    points
+        Where (M, 3) [m].
+    nodes, edges, epsilon
+        Segments, as in `mobility`.
+    force_density
+        Force per length on the fluid at the nodes (N, 3) [N/m], linear along each segment.
+    viscosity
+        Dynamic viscosity [Pa s].
+    threads
+        Threads to use; None: ``FLAGRS_THREADS``, else all.
+
+    Returns
+    -------
+    ndarray
+        Velocity (M, 3) [m/s].
+
+    Raises
+    ------
+    SceneError
+        As `mobility`, and for a viscosity that is not positive.
+
+    Examples
+    --------
+    >>> u = velocity([[0.0, 0.0, 1.0]], [[-1, 0, 0], [1, 0, 0]], [[0, 1]], [[1, 0, 0], [1, 0, 0]], 1.0, 0.1)
+    >>> bool(u[0, 0] > 0.0)
+    True
+    """
+    sources, pairs, widths = _segments(nodes, edges, epsilon)
+    density = _vectors("force_density", force_density)
+    if density.shape != sources.shape:
+        raise _wrong("force_density", f"shape {density.shape}", f"of shape {sources.shape}")
+    if not (np.isscalar(viscosity) and 0.0 < viscosity < np.inf):
+        raise _wrong("viscosity", viscosity, "> 0 Pa s")
+    at = _vectors("points", points)
+    return _flagrs.velocity(
+        at, sources, pairs, density, float(viscosity), widths, _flagrs.thread_count(threads)
+    )
+
+
+def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:
+    """Return nodal forces (N, 3) [N] of a nodal force density (N, 3) [N/m]: the integrals of hat functions times it.
+
+    Total force and torque are exact: ``hat_weights(...).sum(axis=0)`` is the integral of the density.
+    """
+    points, pairs, _ = _segments(nodes, edges, 1.0)
+    density = _vectors("force_density", force_density)
+    if density.shape != points.shape:
+        raise _wrong("force_density", f"shape {density.shape}", f"of shape {points.shape}")
+    return _flagrs.hat_weights(points, pairs, density)
+
+
+def _wrong(field: str, value: Any, allowed: str) -> SceneError:
+    return SceneError(
+        f"{field}: {value} is not allowed; must be {allowed}", field=field, value=value, allowed=allowed
+    )
+
+
+def _vectors(field: str, value: Any) -> FloatArray:
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise _wrong(field, repr(value), "numbers of shape (N, 3)") from error
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise _wrong(field, f"shape {array.shape}", "of shape (N, 3)")
+    return array
+
+
+def _segments(nodes: Any, edges: Any, epsilon: Any) -> tuple[FloatArray, IntArray, FloatArray]:
+    points = _vectors("nodes", nodes)
+    pairs = np.ascontiguousarray(edges, dtype=np.int64)
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise _wrong("edges", f"shape {pairs.shape}", "of shape (E, 2)")
+    valid = (pairs >= 0) & (pairs < len(points))
+    if not valid.all() or (pairs[:, 0] == pairs[:, 1]).any():
+        raise _wrong("edges", "an edge", f"two different nodes in 0..{len(points) - 1}")
+    lengths = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
+    if (lengths == 0.0).any():
+        raise _wrong(
+            "nodes", f"edge {int(np.argmin(lengths))} of zero length", "distinct at the ends of an edge"
+        )
+    try:
+        widths = np.broadcast_to(np.asarray(epsilon, dtype=np.float64), len(pairs)).copy()
+    except ValueError as error:
+        raise _wrong(
+            "epsilon", f"shape {np.shape(epsilon)}", f"a number or of shape ({len(pairs)},)"
+        ) from error
+    return points, pairs, widths

@@ -1,0 +1,158 @@
+"""Running a scene into a file: from the start, or on from where an earlier run was interrupted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from flagrs.errors import FlagrsError
+from flagrs.scene import Scene
+from flagrs.scene.shapes import number
+from flagrs.scene.values import Bounds
+from flagrs.simulation import Simulation
+from flagrs.trajectory import Trajectory
+
+#: Settings that change the result: a file made with other ones than those asked for is another run.
+_TELLING = ("scheme", "dt", "rtol")
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """How a scene is run.
+
+    Attributes
+    ----------
+    until : float
+        Simulated time at which the run ends [s].
+    save_every : float
+        Simulated time between frames [s].
+    scheme : str
+        Scheme in time; see `flagrs.Simulation`.
+    dt : float or None
+        Time step [s]; None leaves it to the scheme.
+    rtol : float or None
+        Tolerance of the solver; None leaves it to the scheme.
+    threads : int or None
+        Threads of the simulation; None leaves it to ``FLAGRS_THREADS``.
+    """
+
+    until: float = 10.0
+    save_every: float = 0.1
+    scheme: str = "overdamped"
+    dt: float | None = None
+    rtol: float | None = None
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        """Raise SceneError for times that are not positive."""
+        for name in ("until", "save_every", "dt"):
+            if getattr(self, name) is not None:
+                number(name, getattr(self, name), Bounds("s", above=0.0))
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run left behind.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        The frames of the whole run.
+    resumed_at : float or None
+        Simulated time at which it went on from an earlier run [s]; None if it began at the start.
+    skipped : bool
+        Whether an earlier run had got there already, so that nothing was left to do.
+    """
+
+    trajectory: Trajectory
+    resumed_at: float | None = None
+    skipped: bool = False
+
+
+def run_to_file(
+    scene: Scene,
+    path: Path,
+    settings: RunSettings,
+    *,
+    fresh: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Run a scene into a file, going on from what the file already holds.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    path
+        HDF5 file; if it holds an unfinished run of the same scene and settings, that run goes on.
+    settings
+        How to run.
+    fresh
+        Whether to start anew whatever the file holds.
+    progress
+        Called now and then with the simulated time [s].
+
+    Raises
+    ------
+    FlagrsError
+        If the file holds a run of another scene or with other settings.
+    """
+    existing = None if fresh or not path.exists() else _existing(scene, path, settings)
+    if existing is not None and _reached(existing, settings.until):
+        return Run(existing, skipped=True)
+    if existing is not None and existing.has_checkpoint:
+        simulation = Simulation.restore(path)
+        resumed_at = float(simulation.time)
+    else:
+        simulation = Simulation(scene, settings.scheme, settings.dt, settings.rtol, settings.threads)
+        resumed_at = None
+    trajectory = simulation.run(settings.until, settings.save_every, path=path, progress=progress)
+    return Run(trajectory, resumed_at)
+
+
+def _existing(scene: Scene, path: Path, settings: RunSettings) -> Trajectory:
+    """Return the trajectory in a file, after checking that it belongs to the same run."""
+    trajectory = Trajectory.load(path)
+    if trajectory.scene != scene:
+        raise FlagrsError(
+            f"{path}: holds a run of another scene; choose another file, or start anew (--fresh)"
+        )
+    for name in _TELLING:
+        wanted, found = getattr(settings, name), trajectory.settings[name]
+        if wanted is not None and wanted != found:
+            raise FlagrsError(
+                f"{path}: holds a run with {name} = {found}, not {wanted}; "
+                "choose another file, or start anew (--fresh)"
+            )
+    return trajectory
+
+
+def _reached(trajectory: Trajectory, until: float) -> bool:
+    # The last frame falls on the end but for the round-off of summed steps.
+    return len(trajectory) > 0 and trajectory.time[-1] >= until * (1.0 - 1e-9)
+
+
+def measured(trajectory: Trajectory) -> dict[str, float | None]:
+    """Return the read-outs of a run: None for those the scene or the run cannot give.
+
+    Speed [m/s], head rate [rad/s], mean power [W] and efficiency [1] over the last half, smallest gap [m].
+    """
+    return {
+        "swimming_speed": _if_given(trajectory.swimming_speed),
+        "head_rate": _if_given(trajectory.head_rate),
+        "power": _if_given(trajectory.mean_power),
+        "efficiency": _if_given(trajectory.efficiency),
+        "minimum_gap": float(trajectory.minimum_gap().min())
+        if np.isfinite(trajectory.minimum_gap()).any()
+        else None,
+    }
+
+
+def _if_given(measure: Callable[[], float]) -> float | None:
+    try:
+        return measure()
+    except FlagrsError:
+        return None

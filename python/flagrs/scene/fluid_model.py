@@ -1,0 +1,76 @@
+"""The fluid around the rods, and which model of its drag is used."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import PlainValidator
+
+from flagrs.errors import not_allowed
+from flagrs.scene.part import Part
+from flagrs.scene.values import Array, Bounds, Flag, FloatArray, number, optional_number
+
+#: Regularization over rod radius, by name: matching slender-body theory, and the supplementary text's choice.
+EPSILON_RATIO = {"slender": math.sqrt(math.e), "seed": 1.031}
+
+_length = Array(((),), Bounds("m", above=0.0))
+
+
+def _epsilon(value: Any) -> Any:
+    if isinstance(value, str):
+        if value not in EPSILON_RATIO:
+            raise not_allowed("", value, "'slender', 'seed' or a length > 0 m")
+        return value
+    return _length(value)
+
+
+class Fluid(Part):
+    """A Newtonian fluid at zero Reynolds number.
+
+    Attributes
+    ----------
+    viscosity : float
+        Dynamic viscosity [Pa s], above 0 and up to 1e4.
+    model : str
+        ``RSS`` regularized Stokeslet segments (nonlocal), ``RFT`` resistive force theory (local), or
+        ``none``.
+    epsilon : str or float
+        Regularization of the segments: ``slender`` is sqrt(e) times the rod's radius, which matches
+        slender-body theory; ``seed`` is 1.031 times the radius, as in the supplementary text; or a length
+        [m].
+    twist_drag : bool
+        Whether a filament spinning about its own centreline is resisted, by 4 pi mu a^2 per unit length.
+    coefficients : str
+        Drag coefficients of resistive force theory: ``gray-hancock`` or ``lighthill``.
+    wavelength : float or None
+        Wavelength of the filaments for these coefficients [m]; None: the immersed length of each rod.
+    density : float
+        Density of the fluid [kg/m^3], for buoyancy under gravity.
+    """
+
+    viscosity: Annotated[float, number(Bounds("Pa s", above=0.0, at_most=1e4, if_large="given in mPa s?"))]
+    model: Literal["RSS", "RFT", "none"] = "RSS"
+    epsilon: Annotated[Literal["slender", "seed"] | float, PlainValidator(_epsilon)] = "slender"
+    twist_drag: Flag = True
+    coefficients: Literal["gray-hancock", "lighthill"] = "gray-hancock"
+    wavelength: Annotated[float | None, optional_number(Bounds("m", above=0.0))] = None
+    density: Annotated[float, number(Bounds("kg/m^3", at_least=0.0, at_most=3e4))] = 0.0
+
+    def epsilon_array(self, radius: FloatArray) -> FloatArray:
+        """Return the regularization of each edge.
+
+        Parameters
+        ----------
+        radius
+            Radius (E,) of each edge [m].
+
+        Returns
+        -------
+        ndarray
+            Regularization (E,) [m].
+        """
+        if isinstance(self.epsilon, str):
+            return EPSILON_RATIO[self.epsilon] * radius
+        return np.full(radius.shape, self.epsilon)

@@ -1,0 +1,166 @@
+"""What a scene asks of the machine: sizes, active terms, memory, cost of a step, and what to beware of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flagrs.scene.values import FloatArray
+
+if TYPE_CHECKING:
+    from flagrs.scene.scene import Scene
+
+#: Floating-point operations of one 3x6 pair of Stokeslet blocks (about 25 ns at 8 flop/ns).
+PAIR_FLOPS = 200
+#: Operations of one hinge's and one edge's energy gradient and Hessian, and of its share of the sparse solve.
+HINGE_FLOPS = 6000
+#: Newton iterations of a typical step.
+NEWTON_ITERATIONS = 3
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is simulated, what is left out, and what a step costs.
+
+    Attributes
+    ----------
+    nodes, edges, hinges : int
+        Size of the network.
+    immersed_nodes : int
+        Nodes on which the fluid acts.
+    dofs : int
+        Degrees of freedom: 3 per node, 1 per edge, 1 more per torque-driven motor.
+    terms : tuple of str
+        The active terms, in words.
+    left_out : tuple of str
+        Terms the scene does not have, which cost nothing.
+    fluid_matrix : int
+        Rows of the dense fluid matrix; 0 without one.
+    flops : float
+        Estimated floating-point operations of a step, to a factor of two or three.
+    warnings : tuple of str
+        What may spoil the result, with numbers.
+    """
+
+    nodes: int
+    edges: int
+    hinges: int
+    immersed_nodes: int
+    dofs: int
+    terms: tuple[str, ...]
+    left_out: tuple[str, ...]
+    fluid_matrix: int
+    flops: float
+    warnings: tuple[str, ...]
+
+    @property
+    def fluid_bytes(self) -> int:
+        """Memory of the dense fluid matrix [bytes]."""
+        return 8 * self.fluid_matrix**2
+
+    def __str__(self) -> str:
+        """Return the plan for a person to read."""
+        lines = [
+            f"{self.nodes} nodes, {self.edges} edges, {self.hinges} hinges: {self.dofs} degrees of freedom",
+            "active:   " + "\n          ".join(self.terms),
+            "left out: " + (", ".join(self.left_out) or "nothing"),
+        ]
+        if self.fluid_matrix:
+            lines.append(
+                f"fluid:    dense {self.fluid_matrix} x {self.fluid_matrix}, {_size(self.fluid_bytes)}"
+            )
+        lines.append(f"a step:   about {self.flops / 1e6:.3g} million floating-point operations")
+        return "\n".join([*lines, *(f"warning:  {warning}" for warning in self.warnings)])
+
+
+def plan_of(scene: Scene) -> Plan:
+    """Return the plan of a scene."""
+    torque_motors = sum(motor.drive == "torque" for motor in scene.motors)
+    immersed = _immersed_nodes(scene)
+    fluid_model = "none" if scene.fluid is None else scene.fluid.model
+    dense = 3 * immersed if fluid_model == "RSS" else 0
+    present, absent = _terms(scene)
+    return Plan(
+        nodes=scene.node_count,
+        edges=scene.edge_count,
+        hinges=scene.hinge_count,
+        immersed_nodes=immersed,
+        dofs=3 * scene.node_count + scene.edge_count + torque_motors,
+        terms=tuple(present),
+        left_out=tuple(absent),
+        fluid_matrix=dense,
+        flops=_flops(scene, dense),
+        warnings=tuple(_warnings(scene)),
+    )
+
+
+def _immersed_nodes(scene: Scene) -> int:
+    return sum(len(np.unique(rod.edge_array()[rod.immersed_array()])) for rod in scene.rods)
+
+
+def _flops(scene: Scene, dense: int) -> float:
+    elastic = NEWTON_ITERATIONS * HINGE_FLOPS * (scene.hinge_count + scene.edge_count)
+    immersed_edges = sum(int(rod.immersed_array().sum()) for rod in scene.rods)
+    assembly = PAIR_FLOPS * (dense / 3) * immersed_edges if dense else 0.0
+    return float(elastic + assembly + 2.0 / 3.0 * dense**3)
+
+
+def _terms(scene: Scene) -> tuple[list[str], list[str]]:
+    """Return the active terms and the missing ones, in words."""
+    fluid = scene.fluid
+    flows = fluid is not None and fluid.model != "none"
+    heavy = bool(scene.gravity.any())
+    turned = [motor.drive for motor in scene.motors]
+    words = {
+        "fluid": f"{fluid.model} fluid, viscosity {fluid.viscosity:g} Pa s" if fluid and flows else "",
+        "twist drag": "twist drag" if fluid and flows and fluid.twist_drag else "",
+        "head": f"head at node {scene.head.node} of rod {scene.head.rod}" if scene.head else "",
+        "motors": f"{turned.count('speed')} speed and {turned.count('torque')} torque motors"
+        if turned
+        else "",
+        "clamps": f"{len(scene.clamps)} clamps" if scene.clamps else "",
+        "point loads": f"{len(scene.loads)} point loads" if scene.loads else "",
+        "contact": f"contact ({scene.contact.method})" if scene.contact else "",
+        "gravity": f"gravity {np.linalg.norm(scene.gravity):g} m/s^2" if heavy else "",
+        "buoyancy": "buoyancy" if heavy and fluid and fluid.density > 0.0 else "",
+    }
+    elastic = "stretching, bending, twisting" if scene.hinge_count else "stretching"
+    return [elastic, *filter(None, words.values())], [term for term, text in words.items() if not text]
+
+
+def _warnings(scene: Scene) -> list[str]:
+    found = []
+    fluid = scene.fluid
+    if fluid is not None and fluid.model == "RSS":
+        for number, rod in enumerate(scene.rods):
+            ratio = rod.rest_lengths() / fluid.epsilon_array(rod.radius_array())
+            found += _conditioning(number, ratio[rod.immersed_array()])
+    if scene.head is not None and fluid is None:
+        found.append("the head feels no drag, because the scene has no fluid")
+    if fluid is not None and fluid.density > 0.0 and not scene.gravity.any():
+        found.append(
+            f"the fluid's density of {fluid.density:g} kg/m^3 is not used, because there is no gravity"
+        )
+    return found
+
+
+def _conditioning(rod: int, ratio: FloatArray) -> list[str]:
+    """Return the warning for edges shorter than the regularization, where the force density oscillates."""
+    short = int((ratio < 1.0).sum())
+    if short == 0:
+        return []
+    return [
+        f"rods[{rod}]: {short} immersed edges are shorter than the regularization "
+        f"(down to {ratio.min():.2g} of it); the fluid matrix is ill-conditioned there: "
+        "use longer edges or a smaller epsilon"
+    ]
+
+
+def _size(count: float) -> str:
+    for unit in ("bytes", "kB", "MB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} GB"

@@ -1,0 +1,155 @@
+"""A scene: rods, fluid, head, motors, clamps, loads and contact, in SI units."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, PlainValidator, field_validator, model_validator
+
+from flagrs.errors import combined, faulty
+from flagrs.scene import codec, scene_checks
+from flagrs.scene.clamp import Clamp
+from flagrs.scene.contact_model import Contact
+from flagrs.scene.fluid_model import Fluid
+from flagrs.scene.head import Head
+from flagrs.scene.load import PointLoad
+from flagrs.scene.motor import Motor
+from flagrs.scene.part import Part
+from flagrs.scene.plan import Plan, plan_of
+from flagrs.scene.rod import Rod
+from flagrs.scene.values import Array, Bounds, FloatArray, origin
+
+
+class Scene(Part):
+    """Everything that is simulated, and nothing that depends on how.
+
+    The parts of several rods are numbered one rod after the other: node `i` of rod `r` is node
+    ``scene.node_offset(r) + i`` of the scene.
+
+    Attributes
+    ----------
+    rods : sequence of Rod
+        The rods, at least one.
+    fluid : Fluid or None
+        The fluid around them; None: vacuum.
+    head : Head or None
+        The robot's head.
+    motors, clamps, loads : sequence of Motor, Clamp and PointLoad
+        What drives, holds and loads the rods. A single part may stand for a list of one.
+    contact : Contact or None
+        How touching edges are kept apart; None: they pass through each other.
+    gravity : ndarray
+        Gravitational acceleration (3,) [m/s^2].
+    name : str
+        Name for files and figures.
+    """
+
+    rods: tuple[Rod, ...]
+    fluid: Fluid | None = None
+    head: Head | None = None
+    motors: tuple[Motor, ...] = ()
+    clamps: tuple[Clamp, ...] = ()
+    loads: tuple[PointLoad, ...] = ()
+    contact: Contact | None = None
+    gravity: Annotated[FloatArray, PlainValidator(Array(((3,),), Bounds("m/s^2")))] = Field(
+        default_factory=origin
+    )
+    name: str = "scene"
+
+    @field_validator("rods", "motors", "clamps", "loads", mode="before")
+    @classmethod
+    def _listed(cls, value: Any) -> Any:
+        """Let a single part stand for a list of one."""
+        return (value,) if isinstance(value, Part) else value
+
+    @model_validator(mode="after")
+    def _check(self) -> Scene:
+        if not self.rods:
+            raise faulty("rods", "a scene without rods", "at least one rod")
+        found = scene_checks.problems(self)
+        if found:
+            raise combined(found)
+        return self
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes of all rods."""
+        return sum(len(rod.nodes) for rod in self.rods)
+
+    @property
+    def edge_count(self) -> int:
+        """Number of edges of all rods."""
+        return sum(len(rod.edge_array()) for rod in self.rods)
+
+    @property
+    def hinge_count(self) -> int:
+        """Number of hinges of all rods."""
+        return sum(len(rod.hinge_array()) for rod in self.rods)
+
+    def node_offset(self, rod: int) -> int:
+        """Return the scene's number of the first node of a rod."""
+        return sum(len(other.nodes) for other in self.rods[:rod])
+
+    def edge_offset(self, rod: int) -> int:
+        """Return the scene's number of the first edge of a rod."""
+        return sum(len(other.edge_array()) for other in self.rods[:rod])
+
+    def node_array(self) -> FloatArray:
+        """Return the initial positions (N, 3) of all nodes [m]."""
+        return np.concatenate([rod.nodes for rod in self.rods])
+
+    def plan(self) -> Plan:
+        """Return what is simulated, what is left out and what a step costs; print it to read it."""
+        return plan_of(self)
+
+    def digest(self) -> str:
+        """Return a hash of the whole description: scenes with the same one are the same scene."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+    def to_json(self) -> str:
+        """Return the scene as JSON text; numbers come back to the last bit.
+
+        Raises
+        ------
+        SceneError
+            If a signal is a Python function, which cannot be written: use a `Table`.
+        """
+        return codec.to_json(self)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Return the scene that `to_json` wrote."""
+        data: dict[str, Any] = codec.from_json(text)
+        return cls(**data)
+
+    def to_toml(self, path: str | Path) -> None:
+        """Write the scene as a TOML file; numbers come back to the last bit.
+
+        Raises
+        ------
+        SceneError
+            If a signal is a Python function, which cannot be written: use a `Table`.
+        """
+        from flagrs.scene import toml  # toml reads scenes, so it is above this module
+
+        toml.write(self, Path(path))
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Scene:
+        """Return the scene described by a TOML file.
+
+        Besides the fields of the parts, a rod may say ``shape = "helix"`` or ``"straight"`` with the
+        arguments of that constructor, and a file may say ``scenario = "robot"`` with a table
+        ``[parameters]``.
+
+        Raises
+        ------
+        SceneError
+            If the file is not TOML, or does not describe a scene.
+        """
+        from flagrs.scene import toml  # toml reads scenes, so it is above this module
+
+        return toml.read(Path(path))

@@ -1,0 +1,101 @@
+"""Prescribed functions of time: a number, a table, or any Python function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import PlainValidator, model_validator
+
+from flagrs.errors import SceneError, not_allowed
+from flagrs.scene.part import Part
+from flagrs.scene.values import Array, Bounds, FloatArray
+
+
+class Table(Part):
+    """A function of time given at instants, linear between them and held constant outside.
+
+    Attributes
+    ----------
+    times : ndarray
+        Instants (n,) [s], strictly increasing, n >= 1.
+    values : ndarray
+        Values (n,) at the instants, in the unit of the field the table is given for.
+
+    Examples
+    --------
+    >>> ramp = Table(times=[0.0, 2.0], values=[0.0, 4.0])
+    >>> ramp(1.0), ramp(5.0)
+    (2.0, 4.0)
+    """
+
+    times: Annotated[FloatArray, PlainValidator(Array((("n",),), Bounds("s")))]
+    values: Annotated[FloatArray, PlainValidator(Array((("n",),), Bounds("1")))]
+
+    @model_validator(mode="after")
+    def _check(self) -> Table:
+        if self.times.size == 0:
+            raise not_allowed("times", [], "at least one instant")
+        steps = np.diff(self.times)
+        if (steps <= 0.0).any():
+            worst = int(np.argmax(steps <= 0.0)) + 1
+            raise not_allowed(f"times[{worst}]", self.times[worst], "later than the instant before it")
+        if self.values.shape != self.times.shape:
+            raise not_allowed("values", self.values, f"as many values as times, {self.times.size}")
+        return self
+
+    def __call__(self, time: float) -> float:
+        """Return the value at a time [s]."""
+        return float(np.interp(time, self.times, self.values))
+
+
+Signal = float | Table | Callable[[float], float]
+
+_number = Array(((),), Bounds("1"))
+
+
+def _signal(value: Any) -> Any:
+    if isinstance(value, dict):
+        return Table(**value)
+    if callable(value):
+        return value
+    return _number(value)
+
+
+#: Annotation of a field that holds a signal; None is for the field's own default only.
+CheckedSignal = Annotated[Signal, PlainValidator(_signal)]
+CheckedSignalOrNone = Annotated[
+    Signal | None, PlainValidator(lambda value: None if value is None else _signal(value))
+]
+
+
+def signal_value(signal: Signal, time: float) -> float:
+    """Return a signal's value at a time.
+
+    Parameters
+    ----------
+    signal
+        A number, a `Table` or a function of time.
+    time
+        Time [s].
+
+    Raises
+    ------
+    SceneError
+        If a function gives anything but a finite number.
+    """
+    if isinstance(signal, int | float):
+        return float(signal)
+    value = signal(time)
+    try:
+        finite = bool(np.isfinite(value))
+    except TypeError:
+        finite = False
+    if not finite:
+        raise SceneError(
+            f"signal {signal!r} at t = {time:g} s: gave {value!r}; must be a finite number",
+            value=value,
+            allowed="a finite number",
+        )
+    return float(value)

@@ -1,0 +1,398 @@
+"""Simulations: a scene set in motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse
+
+from flagrs import _flagrs
+from flagrs.assemble import edges_of, native_scene
+from flagrs.errors import SceneError
+from flagrs.recorder import Recorder, load_checkpoint
+from flagrs.scene import Scene
+from flagrs.scene.shapes import number
+from flagrs.scene.values import Bounds, FloatArray, IntArray
+from flagrs.time_step import STABLE_SHARE, default_step, explicit_limit
+from flagrs.trajectory import Trajectory
+
+#: Where runs are saved when no path is given.
+RUNS_FOLDER = Path("flagrs-runs")
+
+#: Frames between checkpoints.
+CHECKPOINT_FRAMES = 20
+
+
+class Simulation:
+    """A scene set in motion.
+
+    Parameters
+    ----------
+    scene
+        What is simulated.
+    scheme
+        ``overdamped``: no inertia, fluid and elasticity implicit, first order, the default; ``implicit``: the same
+        with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the last velocities, stable
+        only for small steps (docs/theory/time.md).
+    dt
+        Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit for the
+        explicit scheme.
+    rtol
+        Reserved for adaptive steps; must be None.
+    threads
+        Threads to use; None: ``FLAGRS_THREADS``, else all. Results do not depend on it.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be simulated by this scheme, or an option is out of range.
+
+    Examples
+    --------
+    >>> import flagrs
+    >>> simulation = flagrs.Simulation(flagrs.scenarios.robot(rpm=20.0))
+    >>> simulation.step(10)
+    >>> simulation.nodes.shape
+    (59, 3)
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        scheme: str = "overdamped",
+        dt: float | None = None,
+        rtol: float | None = None,
+        threads: int | None = None,
+    ) -> None:
+        if not isinstance(scene, Scene):
+            raise SceneError(
+                f"scene: {type(scene).__name__} is not allowed; must be a flagrs.Scene",
+                field="scene",
+                value=scene,
+                allowed="a flagrs.Scene",
+            )
+        if rtol is not None:
+            raise SceneError(
+                f"rtol: {rtol} is not allowed; must be None: the schemes of this release take fixed steps, see dt",
+                field="rtol",
+                value=rtol,
+                allowed="None",
+            )
+        if threads is not None and (not isinstance(threads, int) or threads < 1):
+            raise SceneError(
+                f"threads: {threads} is not allowed; must be an integer >= 1",
+                field="threads",
+                value=threads,
+                allowed="an integer >= 1",
+            )
+        step = default_step(scene) if dt is None else number("dt", dt, Bounds("s", above=0.0))
+        _check_scheme(scene, scheme)
+        self._scene = scene
+        self._native = _flagrs.Simulation(native_scene(scene), scheme, step, _flagrs.thread_count(threads))
+        self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
+        self._restored: Path | None = None
+        if scheme == "explicit" and dt is None:
+            self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
+
+    @classmethod
+    def restore(cls, path: str | Path, scene: Scene | None = None) -> Self:
+        """Return the simulation at the checkpoint in a file; it goes on to the last bit.
+
+        Parameters
+        ----------
+        path
+            A file written by `checkpoint` or `run`, also of a run that was killed.
+        scene
+            The scene; needed only if Python functions drive it, which no file can hold.
+
+        Raises
+        ------
+        FlagrsError
+            If the file holds no checkpoint, or one of another scene.
+        """
+        saved = load_checkpoint(path, scene)
+        simulation = cls(saved.scene, **saved.settings)
+        simulation.load_state(saved.state)
+        simulation._restored = Path(path)
+        return simulation
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+        return self._scene
+
+    @property
+    def scheme(self) -> str:
+        """The scheme in time."""
+        return self._native.scheme
+
+    @property
+    def dt(self) -> float:
+        """Length of a step [s]."""
+        return self._native.dt
+
+    @dt.setter
+    def dt(self, value: float) -> None:
+        self._native.dt = number("dt", value, Bounds("s", above=0.0))
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._native.time
+
+    @property
+    def nodes(self) -> FloatArray:
+        """Positions (N, 3) of the nodes [m]; a copy."""
+        return self._native.nodes
+
+    @property
+    def edges(self) -> IntArray:
+        """Start and end node (E, 2) of the edges."""
+        return edges_of(self._scene)
+
+    @property
+    def theta(self) -> FloatArray:
+        """Angles (E,) of the material frames against the reference frames [rad]; a copy."""
+        return self._native.theta
+
+    @property
+    def velocities(self) -> FloatArray:
+        """Velocities (N, 3) of the nodes over the last step [m/s]; a copy."""
+        return self._native.velocities
+
+    @property
+    def dof_of_node(self) -> IntArray:
+        """First of the three degrees of freedom of each node (N,) in `gradient` and `hessian`."""
+        return self._native.dof_of_node
+
+    @property
+    def dof_of_edge(self) -> IntArray:
+        """Degree of freedom of each edge's angle (E,) in `gradient` and `hessian`."""
+        return self._native.dof_of_edge
+
+    @property
+    def mass(self) -> FloatArray:
+        """Mass (ndof,) of each degree of freedom [kg or kg m^2]."""
+        return self._native.mass
+
+    @property
+    def terms(self) -> list[str]:
+        """Names of the terms this scene carries."""
+        return self._native.terms
+
+    @property
+    def statistics(self) -> dict[str, float]:
+        """Counts of steps, rejected steps, Newton, Krylov and contact iterations, and seconds by part."""
+        return self._native.statistics()
+
+    def step(self, n: int = 1) -> None:
+        """Make n steps of `dt`.
+
+        A step that does not converge is made in halves, quarters and so on.
+
+        Raises
+        ------
+        ConvergenceError
+            If even the smallest part does not converge; the simulation stands at its last good state.
+        SceneError
+            If n is not a whole number, at least 0, or a motor's function gives anything but a finite number.
+        """
+        if not isinstance(n, int | np.integer) or n < 0:
+            raise SceneError(
+                f"n: {n} is not allowed; must be an integer >= 0", field="n", value=n, allowed="an integer >= 0"
+            )
+        self._native.step(int(n))
+
+    def run(
+        self,
+        until: float,
+        save_every: float,
+        path: str | Path | Literal[False] | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Trajectory:
+        """Run until a time and return what was recorded.
+
+        Steps are shortened a little so that a whole number of them makes `save_every`. The file is complete at any moment:
+        a run that is killed can be read, and gone on with by `Simulation.restore`.
+
+        Parameters
+        ----------
+        until
+            Simulated time to reach [s]; later than the present.
+        save_every
+            Simulated time between frames [s].
+        path
+            HDF5 file. None: a new file in ``flagrs-runs/``; False: nothing is saved.
+        progress
+            Called with the simulated time [s] after every frame.
+
+        Raises
+        ------
+        ConvergenceError
+            As `step`; frames up to there are saved.
+        SceneError
+            If a time is out of range.
+        """
+        end = number("until", until, Bounds("s", above=self.time))
+        every = number("save_every", save_every, Bounds("s", above=0.0))
+        target = self._path(path)
+        again = target is not None and target == self._restored
+        recorder = Recorder.resume(target, self._scene) if again and target else self._recorder(target)
+        with recorder:
+            if not again:
+                recorder.append(self.frame())
+            for time in _frame_times(self.time, end, every):
+                self._reach(time)
+                recorder.append(self.frame())
+                if recorder.frame_count % CHECKPOINT_FRAMES == 0:
+                    recorder.checkpoint(self.state())
+                if progress is not None:
+                    progress(self.time)
+            recorder.checkpoint(self.state())
+        return recorder.trajectory()
+
+    def _path(self, path: str | Path | Literal[False] | None) -> Path | None:
+        if path is False:
+            return None
+        if path is not None:
+            return Path(path)
+        RUNS_FOLDER.mkdir(exist_ok=True)
+        stamp = f"{self._scene.name}-{datetime.now():%Y%m%d-%H%M%S}"
+        names = (f"{stamp}{'' if k == 0 else f'-{k}'}.h5" for k in range(10_000))
+        return next(RUNS_FOLDER / name for name in names if not (RUNS_FOLDER / name).exists())
+
+    def _recorder(self, path: Path | None) -> Recorder:
+        return Recorder(path, self._scene, self._settings)
+
+    def _reach(self, time: float) -> None:
+        """Step to a time exactly, in equal steps no longer than `dt`."""
+        span = time - self.time
+        wanted = self._native.dt
+        count = max(1, math.ceil(span / wanted - 1e-9))
+        self._native.dt = span / count
+        try:
+            self._native.step(count)
+        finally:
+            self._native.dt = wanted
+
+    def set_state(self, nodes: Any, theta: Any = None) -> None:
+        """Place the nodes and, if given, the edge angles; everything at rest.
+
+        Frames are transported from those of the last accepted step, so that the result does not depend on the
+        placements before.
+
+        Parameters
+        ----------
+        nodes
+            Positions (N, 3) [m].
+        theta
+            Angles (E,) of the material frames [rad]; None: unchanged.
+
+        Raises
+        ------
+        SceneError
+            For a wrong shape, a value that is not finite, or a shape that is not a configuration; nothing is changed.
+        """
+        self._native.place(_array("nodes", nodes, 2), None if theta is None else _array("theta", theta, 1))
+
+    def energy(self) -> Mapping[str, float]:
+        """Return the elastic energies [J]: stretching, bending, twisting and their total."""
+        parts = self._native.energies()
+        return dict(zip(("stretching", "bending", "twisting"), parts, strict=True)) | {"total": sum(parts)}
+
+    def gradient(self) -> FloatArray:
+        """Return the gradient (ndof,) of the elastic energy [N, N m].
+
+        The numbering interleaves ``x0 y0 z0 theta0 x1 ...``; see `dof_of_node` and `dof_of_edge`. Angles of torque-driven
+        motors come last.
+        """
+        return self._native.gradient()
+
+    def hessian(self) -> scipy.sparse.csc_matrix:
+        """Return the Hessian (ndof, ndof) of the elastic energy in the numbering of `gradient` [N/m, N, N m]."""
+        values, rows, starts = self._native.hessian()
+        size = self._native.dof_count
+        return scipy.sparse.csc_matrix((values, rows, starts), shape=(size, size))
+
+    def resistance(self) -> FloatArray:
+        """Return the resistance (3N, 3N) of the nodes to the fluid [N s/m], zero for dry nodes.
+
+        ``resistance() @ velocities.ravel()`` is the force that drags the nodes at these velocities; twist drag and head
+        are not in it.
+        """
+        return self._native.resistance()
+
+    def stable_step(self) -> float:
+        """Return the longest stable step of the explicit scheme [s]: 2 over the largest eigenvalue of M^-1 Res."""
+        rows = (self.dof_of_node[:, None] + np.arange(3)).ravel()
+        return explicit_limit(self.resistance(), self.mass[rows])
+
+    def frame(self) -> dict[str, Any]:
+        """Return everything known of the present instant; see `flagrs.frame.FIELDS` for shapes and units."""
+        return self._native.frame()
+
+    def state(self) -> dict[str, npt.NDArray[Any]]:
+        """Return everything that changes, to the last bit."""
+        return self._native.state()
+
+    def load_state(self, state: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Take over what `state` returned, of a simulation of the same scene.
+
+        Raises
+        ------
+        SceneError
+            If it does not belong to this scene, or is not finite.
+        """
+        self._native.load_state(state)
+
+    def checkpoint(self, path: str | Path) -> None:
+        """Write the present state to a file that `restore` reads."""
+        with self._recorder(Path(path)) as recorder:
+            recorder.append(self.frame())
+            recorder.checkpoint(self.state())
+
+    def __repr__(self) -> str:
+        """Describe the simulation in a line."""
+        return f"<flagrs.Simulation of {self._scene.name!r}: {self._native!r}>"
+
+
+def _frame_times(start: float, end: float, every: float) -> list[float]:
+    """Return the times of frames after the start: multiples of the interval, and the end."""
+    first = math.floor(start / every * (1.0 + 1e-12) + 1e-9) + 1
+    last = math.ceil(end / every - 1e-9)
+    return [min(k * every, end) for k in range(first, last + 1)]
+
+
+def _array(field: str, value: Any, dimensions: int) -> FloatArray:
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.ndim != dimensions:
+        raise SceneError(
+            f"{field}: shape {np.shape(value)} is not allowed; must have {dimensions} dimensions",
+            field=field,
+            value=value,
+            allowed=f"{dimensions} dimensions",
+        )
+    return array
+
+
+def _check_scheme(scene: Scene, scheme: str) -> None:
+    if scheme != "overdamped":
+        return
+    wet = scene.fluid is not None and scene.fluid.model != "none"
+    if not wet or not any(rod.immersed_array().any() for rod in scene.rods):
+        raise SceneError(
+            "scheme: overdamped is not allowed without a fluid; must be implicit, or the scene needs a fluid with a "
+            "model that resists motion",
+            field="scheme",
+            value=scheme,
+            allowed="implicit or explicit for a scene without drag",
+        )

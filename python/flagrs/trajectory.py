@@ -1,0 +1,258 @@
+"""The record of a run: arrays over time, and what is measured on them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from flagrs import trajectory_file
+from flagrs.errors import FlagrsError
+from flagrs.measures import angle_about, slope, window
+from flagrs.scene import Head, Motor, Scene, Table, codec
+from flagrs.scene.rod_topology import edges_at_nodes, far_end
+from flagrs.scene.values import FloatArray
+from flagrs.trajectory_file import Contents
+
+
+class Trajectory:
+    """The frames of a run, in SI units.
+
+    With T frames, N nodes, E edges and M motors, in the scene's numbering:
+
+    Attributes
+    ----------
+    time : ndarray
+        Instants (T,) [s].
+    nodes, velocities : ndarray
+        Positions (T, N, 3) [m] and velocities (T, N, 3) [m/s].
+    theta : ndarray
+        Angles (T, E) of the material frames [rad].
+    force_density : ndarray
+        Force on the fluid per length (T, N, 3) [N/m]; zero where the fluid does not act.
+    motor_angle, motor_speed, motor_torque : ndarray
+        Angles [rad], speeds [rad/s] and torques [N m] of the shafts (T, M).
+    contacts : ndarray
+        Number of touching pairs of edges (T,).
+    energy : ndarray
+        Stretching, bending and twisting energy (T, 3) [J].
+    scene : Scene
+        The scene that ran.
+    settings : dict
+        How it ran.
+    path : Path or None
+        The file the trajectory was read from.
+    finished : bool
+        Whether the run reached its end.
+    wall_seconds : float
+        Wall time of the run [s].
+    """
+
+    def __init__(self, contents: Contents, scene: Scene, path: Path | None = None) -> None:
+        frames = contents.frames
+        self._contents = contents
+        self.time = frames["time"]
+        self.nodes = frames["nodes"]
+        self.theta = frames["theta"]
+        self.velocities = frames["velocities"]
+        self.force_density = frames["force_density"]
+        self.motor_angle = frames["motor_angle"]
+        self.motor_speed = frames["motor_speed"]
+        self.motor_torque = frames["motor_torque"]
+        self.contacts = frames["contacts"].astype(np.int64)
+        self.energy = frames["energy"]
+        self.scene = scene
+        self.settings: dict[str, Any] = json.loads(contents.manifest["settings"])
+        self.path = path
+        self.finished = contents.finished
+        self.wall_seconds = contents.wall_seconds
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Return the trajectory in a file, whether its run finished, goes on, or was killed.
+
+        Signals that were Python functions come back as tables of their values at the frames.
+        """
+        contents = trajectory_file.read(Path(path))
+        return cls(contents, recorded_scene(contents), Path(path))
+
+    def save(self, path: str | Path) -> None:
+        """Write the trajectory to a file, with its last checkpoint if it has one."""
+        trajectory_file.write_whole(Path(path), self._contents)
+
+    @property
+    def has_checkpoint(self) -> bool:
+        """Whether the run can be gone on with; see `flagrs.Simulation.restore`."""
+        return self._contents.state is not None
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        """Return a one-line summary."""
+        until = f", 0 to {self.time[-1]:g} s" if len(self) else ""
+        return f"Trajectory({self.scene.name}: {len(self)} frames of {self.nodes.shape[1]} nodes{until})"
+
+    def swimming_speed(self, start: float | None = None, end: float | None = None) -> float:
+        """Return the speed of the head node, or of the mean of all nodes in a scene without a head [m/s].
+
+        It is the norm of the least-squares slope of the position against time.
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run.
+
+        Raises
+        ------
+        FlagrsError
+            If fewer than two frames lie in the window.
+        """
+        inside = window(self.time, start, end)
+        return float(np.linalg.norm(slope(self.time[inside], self.position()[inside])))
+
+    def position(self) -> FloatArray:
+        """Return the position (T, 3) of the head node, or of the mean of all nodes without a head [m]."""
+        if self.scene.head is None:
+            mean: FloatArray = self.nodes.mean(axis=1)
+            return mean
+        return self.nodes[:, self._global_node(self.scene.head, self.scene.head.node)]
+
+    def head_rate(self, start: float | None = None, end: float | None = None) -> float:
+        """Return how fast the head turns about the mean direction of the shafts [rad/s].
+
+        It is the least-squares slope of `head_angle`; positive is right-handed about the shafts' direction
+        from the motor to the flagellum. Frames must be close enough for the head to turn less than half a
+        turn between.
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run.
+
+        Raises
+        ------
+        FlagrsError
+            If fewer than two frames lie in the window, or the scene has no head or no motors.
+        """
+        inside = window(self.time, start, end)
+        return float(slope(self.time[inside], self.head_angle()[inside]))
+
+    def head_angle(self) -> FloatArray:
+        """Return the angle (T,) the head has turned about the mean shaft direction, from zero [rad]."""
+        head = self.scene.head
+        if head is None or not self.scene.motors:
+            raise FlagrsError("the turning of the head needs a scene with a head and motors")
+        rod = self.scene.rods[head.rod]
+        edges = edges_at_nodes(rod.edge_array(), len(rod.nodes))[head.node]
+        before, after = sorted(far_end(rod.edge_array(), edge, head.node) for edge in edges)
+        arms = self.nodes[:, self._global_node(head, after)] - self.nodes[:, self._global_node(head, before)]
+        return angle_about(self.shaft_axis(), arms)
+
+    def shaft_axis(self) -> FloatArray:
+        """Return the mean direction (3,) of the shafts, from motor to flagellum, over motors and frames.
+
+        Raises
+        ------
+        FlagrsError
+            If there are no motors or frames, or the directions cancel out.
+        """
+        if not self.scene.motors or not len(self):
+            raise FlagrsError("a shaft direction needs a scene with motors, and a frame")
+        total = np.zeros(3)
+        for motor in self.scene.motors:
+            outer = far_end(self.scene.rods[motor.rod].edge_array(), motor.shaft, motor.node)
+            shaft = (
+                self.nodes[:, self._global_node(motor, outer)]
+                - self.nodes[:, self._global_node(motor, motor.node)]
+            )
+            total += (shaft / np.linalg.norm(shaft, axis=1, keepdims=True)).mean(axis=0)
+        size = float(np.linalg.norm(total))
+        if size < 1e-3 * len(self.scene.motors):
+            raise FlagrsError("the directions of the shafts cancel out; there is no mean direction")
+        return total / size
+
+    def torque(self) -> FloatArray:
+        """Return the torque (T, M) of each motor on its shaft [N m]."""
+        return self.motor_torque
+
+    def power(self) -> FloatArray:
+        """Return the power (T,) of all motors together, torque times speed [W]."""
+        total: FloatArray = (self.motor_torque * self.motor_speed).sum(axis=1)
+        return total
+
+    def mean_power(self, start: float | None = None, end: float | None = None) -> float:
+        """Return the mean power of all motors together in a window, by default the last half of the run [W].
+
+        Parameters
+        ----------
+        start, end
+            Window [s].
+
+        Raises
+        ------
+        FlagrsError
+            If the scene has no motors, or the window holds fewer than two frames.
+        """
+        if not self.scene.motors:
+            raise FlagrsError("the power needs a scene with motors")
+        return float(self.power()[window(self.time, start, end)].mean())
+
+    def efficiency(self, start: float | None = None, end: float | None = None) -> float:
+        """Return Purcell's efficiency R_0 U^2 / P [1].
+
+        R_0 = C_t 6 pi mu r_h is the resistance of the head alone, U the swimming speed and P the mean power
+        of the motors: the power an external force would need to drag the head at that speed, over the power
+        spent (E. M. Purcell, PNAS 94, 11307, 1997).
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run.
+
+        Raises
+        ------
+        FlagrsError
+            If the scene has no head, fluid or motors, the motors spend no power, or the window holds too few
+            frames.
+        """
+        head, fluid = self.scene.head, self.scene.fluid
+        if head is None or fluid is None or not self.scene.motors:
+            raise FlagrsError("the efficiency needs a scene with a head, a fluid and motors")
+        power = self.mean_power(start, end)
+        if power <= 0.0:
+            raise FlagrsError(f"the motors spend no power in the window (mean {power:g} W); no efficiency")
+        resistance = head.C_t * 6.0 * math.pi * fluid.viscosity * head.radius
+        return resistance * self.swimming_speed(start, end) ** 2 / power
+
+    def minimum_gap(self) -> FloatArray:
+        """Return the smallest gap (T,) between colliding edges, surface to surface, or infinity [m]."""
+        return self._contents.frames["minimum_gap"]
+
+    def rod_nodes(self, rod: int) -> FloatArray:
+        """Return the positions (T, n, 3) of the nodes of one rod [m]."""
+        offset = self.scene.node_offset(rod)
+        return self.nodes[:, offset : offset + len(self.scene.rods[rod].nodes)]
+
+    def _global_node(self, part: Head | Motor, node: int) -> int:
+        return self.scene.node_offset(part.rod) + node
+
+
+def trajectory_from(contents: Contents, path: Path | None) -> Trajectory:
+    """Return the trajectory of what a file or a recorder holds."""
+    return Trajectory(contents, recorded_scene(contents), path)
+
+
+def recorded_scene(contents: Contents) -> Scene:
+    """Return the scene of a record, with tables of the recorded samples in place of Python functions."""
+    data: Mapping[str, Any] = codec.from_json(contents.manifest["scene"])
+    times = contents.frames["time"]
+    if contents.signals and not len(times):
+        raise FlagrsError("no frame was recorded yet, so the scene's functions of time are unknown")
+    tables = {path: Table(times=times, values=values) for path, values in contents.signals.items()}
+    return Scene(**codec.filled(data, tables))

@@ -1,0 +1,128 @@
+//! What a state tells: energies, motor torques, force densities, gaps, the balance of forces and torques.
+
+use super::simulation::Simulation;
+use crate::Vec3;
+use crate::elastic::motors::Drive;
+use crate::linear::LinearError;
+use crate::rod::configuration::node;
+
+impl Simulation {
+    /// Energies of stretching, bending and twisting, J.
+    pub fn energies(&mut self) -> [f64; 3] {
+        self.balance.energies(&self.model, &self.state).unwrap_or([f64::NAN; 3])
+    }
+
+    /// Elastic gradient and Hessian values on the model's pattern.
+    pub fn elastic_derivatives(&mut self) -> (Vec<f64>, Vec<f64>) {
+        self.balance.elastic(&self.model, &self.state)
+    }
+
+    /// Smallest gap between surfaces that may touch, m; `None` without contact.
+    pub fn smallest_gap(&self) -> Option<f64> {
+        let law = self.model.contact.as_ref()?;
+        law.smallest_gap(&self.state.positions(&self.model.network)).map(|(gap, _)| gap)
+    }
+
+    /// The deepest initial overlap: its depth in m and the pair of edges.
+    pub fn deepest_overlap(&self) -> Option<(f64, [usize; 2])> {
+        let law = self.model.contact.as_ref()?;
+        let (gap, [a, b]) = law.smallest_gap(&self.state.positions(&self.model.network))?;
+        let sum = self.model.radius[a] + self.model.radius[b];
+        (gap < -law.tolerance() * sum).then_some((-gap, [a, b]))
+    }
+
+    /// Torque of every motor on its shaft, N m.
+    pub fn motor_torques(&mut self) -> Vec<f64> {
+        if self.balance.energies(&self.model, &self.state).is_none() {
+            return vec![f64::NAN; self.model.motors.len()];
+        }
+        let configuration = self.balance.configuration();
+        self.model
+            .motors
+            .iter()
+            .map(|motor| motor.torque(self.model.hinges.moments(motor.hinge, configuration)))
+            .collect()
+    }
+
+    /// Angular velocity of every motor over the last step, rad/s: the prescribed one, or that of the free angle.
+    pub fn motor_speeds(&self) -> Vec<f64> {
+        self.model
+            .motors
+            .iter()
+            .map(|motor| match &motor.drive {
+                Drive::Speed(signal) => signal.value(self.state.time).unwrap_or(f64::NAN),
+                Drive::Torque { dof, .. } => self.state.velocity[*dof],
+            })
+            .collect()
+    }
+
+    /// Force per length on the fluid at every node (3N), N/m, for the present velocities; zero on dry nodes.
+    ///
+    /// # Errors
+    /// If the fluid's matrix is singular.
+    pub fn force_density(&mut self) -> Result<Vec<f64>, LinearError> {
+        self.with_fluid(|fluid, velocity| fluid.force_density(velocity))
+    }
+
+    /// Resistance of the nodes (3N x 3N, column-major), N s/m: the force that moves them through the fluid at given velocities.
+    ///
+    /// # Errors
+    /// If the fluid's matrix is singular.
+    pub fn resistance(&mut self) -> Result<Vec<f64>, LinearError> {
+        let nodes = self.model.network.node_count();
+        let mut out = vec![0.0; 9 * nodes * nodes];
+        let positions = self.state.positions(&self.model.network);
+        let mut ignored = super::statistics::Statistics::default();
+        self.balance.place_fluid(&positions, &mut ignored)?;
+        self.forget_fluid();
+        let Some(fluid) = self.balance.fluid_mut() else {
+            return Ok(out);
+        };
+        let immersed = fluid.immersed().to_vec();
+        let mut column = vec![0.0; 3 * immersed.len()];
+        for (k, &source) in immersed.iter().enumerate() {
+            for c in 0..3 {
+                column.fill(0.0);
+                column[3 * k + c] = 1.0;
+                fluid.resist(&mut column)?;
+                let target = &mut out[(3 * source + c) * 3 * nodes..][..3 * nodes];
+                for (&node, force) in immersed.iter().zip(column.chunks_exact(3)) {
+                    target[3 * node..3 * node + 3].copy_from_slice(force);
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    fn with_fluid(
+        &mut self,
+        solve: impl FnOnce(&mut (dyn crate::fluid::FluidModel + 'static), &mut [f64]) -> Result<(), LinearError>,
+    ) -> Result<Vec<f64>, LinearError> {
+        let mut out = vec![0.0; 3 * self.model.network.node_count()];
+        let positions = self.state.positions(&self.model.network);
+        let mut ignored = super::statistics::Statistics::default();
+        self.balance.place_fluid(&positions, &mut ignored)?;
+        self.forget_fluid();
+        let dofs = self.balance.fluid_dofs().to_vec();
+        let Some(fluid) = self.balance.fluid_mut() else {
+            return Ok(out);
+        };
+        let mut values: Vec<f64> =
+            dofs.iter().flat_map(|&dof| (0..3).map(move |c| dof + c)).map(|dof| self.state.velocity[dof]).collect();
+        solve(fluid, &mut values)?;
+        for (&node, value) in fluid.immersed().iter().zip(values.chunks_exact(3)) {
+            out[3 * node..3 * node + 3].copy_from_slice(value);
+        }
+        Ok(out)
+    }
+
+    /// Positions of the nodes, m.
+    pub fn positions(&self) -> Vec<Vec3> {
+        self.state.positions(&self.model.network)
+    }
+
+    /// Velocities of the nodes over the last step, m/s.
+    pub fn velocities(&self) -> Vec<Vec3> {
+        self.model.network.node_dofs().iter().map(|&dof| node(&self.state.velocity, dof)).collect()
+    }
+}

@@ -1,0 +1,24 @@
+//! Motion: a constant model, a changing state, and the schemes that take one state to the next.
+//!
+//! * [`specification`]: what a scene says, as plain data.
+//! * [`model`]: the constant part of a simulation, built once from a specification.
+//! * [`state`]: the changing part, plain data that can be saved and restored to the last bit.
+//! * [`terms`]: inertia and loads, the terms that belong to no other room.
+//! * [`balance`]: the force balance of one step: residual, derivative, linear solve.
+//! * [`newton`]: Newton's method with line search on that balance.
+//! * [`scheme`]: which terms a time-stepping scheme keeps and how it treats the fluid.
+//! * [`simulation`]: steps, retries, acceptance.
+//! * [`diagnostics`]: motor torques, force densities, gaps.
+//! * [`threads`]: our own thread pool, safe across forks.
+
+pub mod balance;
+pub mod diagnostics;
+pub mod model;
+pub mod newton;
+pub mod scheme;
+pub mod simulation;
+pub mod specification;
+pub mod state;
+pub mod statistics;
+pub mod terms;
+pub mod threads;

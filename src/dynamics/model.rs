@@ -1,0 +1,462 @@
+//! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
+
+use super::specification::{FluidModelSpecification, Specification};
+use super::state::State;
+use super::terms::{Inertia, Loads};
+use crate::Vec3;
+use crate::contact::spillmann::ContactLaw;
+use crate::elastic::bending::Bending;
+use crate::elastic::hinges::Hinges;
+use crate::elastic::motors::{Drive, Motor};
+use crate::elastic::stretching::Stretching;
+use crate::elastic::twisting::Twisting;
+use crate::fluid::FluidModel;
+use crate::fluid::head::Head;
+use crate::fluid::rft::ResistiveForce;
+use crate::fluid::rss::StokesletSegments;
+use crate::fluid::twist_drag::TwistDrag;
+use crate::linear::LinearError;
+use crate::linear::pattern::Pattern;
+use crate::rod::assembly::{HingeElement, Term};
+use crate::rod::configuration::{Configuration, ReferenceFrames, ShaftAngle};
+use crate::rod::network::{Network, NetworkError};
+use std::f64::consts::PI;
+
+/// A model cannot be built from its specification.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// The topology is not valid.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// An array has the wrong length.
+    #[error("{field}: length {length} is not allowed; must be {expected}")]
+    Length {
+        /// Which array.
+        field: &'static str,
+        /// Its length.
+        length: usize,
+        /// What it should be.
+        expected: usize,
+    },
+    /// A value is out of range.
+    #[error("{field}: {value} is not allowed; must be {allowed}")]
+    Value {
+        /// Which quantity.
+        field: String,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// A shape cannot be a configuration: an edge without length, or two edges of a hinge folded onto each other.
+    #[error("{shape}: an edge without length, or two edges folded onto each other, are not allowed")]
+    Shape {
+        /// Which shape.
+        shape: &'static str,
+    },
+    /// A matrix of the model cannot be analysed.
+    #[error(transparent)]
+    Linear(#[from] LinearError),
+}
+
+/// A clamp, by degrees of freedom.
+pub(super) struct Clamp {
+    pub nodes: Vec<usize>,
+    pub edges: Vec<usize>,
+    pub angular_velocity: crate::elastic::signal::Signal,
+    pub velocity: Vec3,
+}
+
+/// Everything about a scene that does not change.
+pub struct Model {
+    pub(super) network: Network,
+    pub(super) dof_count: usize,
+    pub(super) stretching: Stretching,
+    pub(super) hinges: Hinges,
+    pub(super) dissipative: Vec<Box<dyn Term>>,
+    pub(super) inertia: Inertia,
+    pub(super) motors: Vec<Motor>,
+    pub(super) clamps: Vec<Clamp>,
+    pub(super) prescribed: Vec<bool>,
+    pub(super) pattern: Pattern,
+    /// Turns residuals into forces: 1 for positions, one over a length for angles.
+    pub(super) force_weight: Vec<f64>,
+    pub(super) mass: Vec<f64>,
+    pub(super) radius: Vec<f64>,
+    pub(super) stretching_scale: f64,
+    pub(super) bending_scale: f64,
+    pub(super) shortest_edge: f64,
+    pub(super) contact: Option<ContactLaw>,
+    pub(super) specification: Specification,
+}
+
+fn expect(field: &'static str, length: usize, expected: usize) -> Result<(), ModelError> {
+    if length == expected { Ok(()) } else { Err(ModelError::Length { field, length, expected }) }
+}
+
+impl Model {
+    /// Builds the model and its initial state.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming what is not valid.
+    pub fn new(specification: Specification) -> Result<(Self, State), ModelError> {
+        let network = Network::new(specification.nodes.len(), &specification.edges, &specification.hinges)?;
+        check(&specification)?;
+        let dof_count = network.dof_count() + specification.motors.iter().filter(|motor| motor.by_torque).count();
+        let motors = motors(&specification, network.dof_count());
+        let rest = RestShape::new(&specification, &network)?;
+        let elements = (0..network.hinges().len())
+            .map(|hinge| HingeElement::new(&network, hinge, free_angle(&motors, hinge)))
+            .collect();
+        let mut stretching = Stretching::new(&network, specification.stretching.clone(), rest.lengths.clone());
+        let mut hinges = Hinges::new(elements, rest.bending(&specification), rest.twisting(&specification));
+        let mass = masses(&specification, &network, dof_count, &rest.lengths);
+        let mut inertia = Inertia::new(mass.clone());
+        let mut dissipative = dissipative_terms(&specification, &network, dof_count, &rest.lengths);
+        let mut stencils: Vec<Vec<usize>> = stretching.stencils();
+        stencils.extend(hinges.stencils());
+        stencils.extend(dissipative.iter().flat_map(|term| term.stencils()));
+        let pattern = Pattern::from_stencils(dof_count, stencils.iter().map(Vec::as_slice));
+        stretching.bind(&pattern);
+        hinges.bind(&pattern);
+        inertia.bind(&pattern);
+        dissipative.iter_mut().for_each(|term| term.bind(&pattern));
+
+        let mean_length = rest.lengths.iter().sum::<f64>() / rest.lengths.len() as f64;
+        let total_length = rest.lengths.iter().sum::<f64>();
+        let mut force_weight = vec![1.0 / mean_length; dof_count];
+        network.node_dofs().iter().for_each(|&dof| force_weight[dof..dof + 3].fill(1.0));
+        let (clamps, prescribed) = clamps(&specification, &network, dof_count);
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let contact = specification.contact.as_ref().map(|contact| {
+            ContactLaw::new(
+                network.node_count(),
+                network.edges(),
+                &rest.lengths,
+                &specification.radius,
+                contact.exclusion,
+                &contact.colliding,
+                contact.tolerance,
+                contact.max_iterations,
+            )
+        });
+        let state = initial_state(&specification, &network, dof_count);
+        let model = Self {
+            dof_count,
+            stretching,
+            hinges,
+            dissipative,
+            inertia,
+            motors,
+            clamps,
+            prescribed,
+            pattern,
+            force_weight,
+            mass,
+            radius: specification.radius.clone(),
+            stretching_scale: largest(&mut specification.stretching.iter().copied()),
+            bending_scale: largest(&mut specification.bending.iter().map(|ei| ei[0][0].max(ei[1][1])))
+                / (total_length * total_length),
+            shortest_edge: rest.lengths.iter().copied().fold(f64::INFINITY, f64::min),
+            contact,
+            network,
+            specification,
+        };
+        let mut configuration = Configuration::new(&model.network, model.dof_count);
+        if !configuration.update(&model.network, &state.q, &state.frames, &model.shafts(&state.motor_angles, &state.q))
+        {
+            return Err(ModelError::Shape { shape: "nodes" });
+        }
+        Ok((model, state))
+    }
+
+    /// Topology and numbering.
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// Number of degrees of freedom, free motor angles last.
+    pub fn dof_count(&self) -> usize {
+        self.dof_count
+    }
+
+    /// Mass of every degree of freedom: kg for positions, kg m^2 for angles.
+    pub fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    /// Sparsity pattern of the derivative.
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// Names of the active terms.
+    pub fn term_names(&self) -> Vec<&'static str> {
+        let mut names = vec![self.stretching.name(), self.hinges.name()];
+        names.extend(self.dissipative.iter().map(|term| term.name()));
+        names
+    }
+
+    /// Angles of all shafts.
+    pub(super) fn shafts(&self, angles: &[f64], q: &[f64]) -> Vec<ShaftAngle> {
+        self.motors.iter().zip(angles).map(|(motor, &angle)| motor.shaft(angle, q)).collect()
+    }
+
+    /// A fresh drag model, with its own workspace.
+    pub(super) fn fluid(&self) -> Option<Box<dyn FluidModel>> {
+        let fluid = self.specification.fluid.as_ref()?;
+        let (edges, nodes) = (self.network.edges(), &self.specification.nodes);
+        if !fluid.immersed.iter().any(|&immersed| immersed) {
+            return None;
+        }
+        Some(match &fluid.model {
+            FluidModelSpecification::ResistiveForce { coefficients } => {
+                Box::new(ResistiveForce::new(edges, &fluid.immersed, coefficients))
+            }
+            FluidModelSpecification::StokesletSegments { epsilon } => {
+                let local = preconditioner_drag(fluid.viscosity, &self.specification, epsilon);
+                Box::new(StokesletSegments::new(nodes, edges, &fluid.immersed, epsilon, fluid.viscosity, &local))
+            }
+        })
+    }
+}
+
+/// Slender-body coefficients with the logarithm of the mean edge's aspect ratio: a guess good enough to precondition with.
+fn preconditioner_drag(viscosity: f64, specification: &Specification, epsilon: &[f64]) -> Vec<[f64; 2]> {
+    specification
+        .edges
+        .iter()
+        .zip(epsilon)
+        .map(|(&[i, j], &epsilon)| {
+            let length = (specification.nodes[j] - specification.nodes[i]).norm();
+            let logarithm = (1.0 + 4.0 * length / epsilon).ln();
+            let across = 4.0 * PI * viscosity / (logarithm + 0.5);
+            [0.5 * across, across]
+        })
+        .collect()
+}
+
+fn check(specification: &Specification) -> Result<(), ModelError> {
+    let (nodes, edges, hinges) = (specification.nodes.len(), specification.edges.len(), specification.hinges.len());
+    if edges == 0 {
+        return Err(ModelError::Length { field: "edges", length: 0, expected: 1 });
+    }
+    expect("rest_nodes", specification.rest_nodes.len(), nodes)?;
+    expect("theta", specification.theta.len(), edges)?;
+    expect("radius", specification.radius.len(), edges)?;
+    expect("density", specification.density.len(), edges)?;
+    expect("stretching", specification.stretching.len(), edges)?;
+    expect("bending", specification.bending.len(), hinges)?;
+    expect("twisting", specification.twisting.len(), hinges)?;
+    expect("natural_curvature", specification.natural_curvature.len(), hinges)?;
+    expect("natural_twist", specification.natural_twist.len(), hinges)?;
+    let positive = |field: &'static str, values: &[f64]| match values.iter().position(|v| !(*v > 0.0 && v.is_finite()))
+    {
+        Some(k) => Err(ModelError::Value { field: format!("{field}[{k}]"), value: values[k], allowed: "> 0" }),
+        None => Ok(()),
+    };
+    positive("radius", &specification.radius)?;
+    positive("stretching", &specification.stretching)?;
+    positive("twisting", &specification.twisting)?;
+    for (k, ei) in specification.bending.iter().enumerate() {
+        let determinant = ei[0][0] * ei[1][1] - ei[0][1] * ei[1][0];
+        if !(ei[0][0] > 0.0 && determinant > 0.0 && ei[0][1] == ei[1][0]) {
+            return Err(ModelError::Value {
+                field: format!("bending[{k}]"),
+                value: determinant,
+                allowed: "symmetric and positive definite",
+            });
+        }
+    }
+    Ok(())
+}
+
+struct RestShape {
+    lengths: Vec<f64>,
+    voronoi: Vec<f64>,
+    curvatures: Vec<[f64; 2]>,
+    twists: Vec<f64>,
+}
+
+impl RestShape {
+    fn new(specification: &Specification, network: &Network) -> Result<Self, ModelError> {
+        let nodes = &specification.rest_nodes;
+        let lengths: Vec<f64> = network.edges().iter().map(|&[i, j]| (nodes[j] - nodes[i]).norm()).collect();
+        let frames = shape_frames(specification, network, nodes);
+        let mut configuration = Configuration::new(network, network.dof_count());
+        let q = coordinates(network, nodes, &vec![0.0; lengths.len()], network.dof_count());
+        if !configuration.update(network, &q, &frames, &[]) {
+            return Err(ModelError::Shape { shape: "rest_nodes" });
+        }
+        let strains = (0..network.hinges().len()).map(|k| *configuration.strain(k));
+        Ok(Self {
+            voronoi: network
+                .hinges()
+                .iter()
+                .map(|hinge| 0.5 * (lengths[hinge.edges[0]] + lengths[hinge.edges[1]]))
+                .collect(),
+            curvatures: strains.clone().map(|strain| strain.kappa).collect(),
+            twists: strains.map(|strain| strain.tau).collect(),
+            lengths,
+        })
+    }
+
+    fn bending(&self, specification: &Specification) -> Vec<Bending> {
+        (0..self.voronoi.len())
+            .map(|k| Bending {
+                stiffness: specification.bending[k].map(|row| row.map(|entry| entry / self.voronoi[k])),
+                natural: specification.natural_curvature[k].unwrap_or(self.curvatures[k]),
+            })
+            .collect()
+    }
+
+    fn twisting(&self, specification: &Specification) -> Vec<Twisting> {
+        (0..self.voronoi.len())
+            .map(|k| Twisting {
+                stiffness: specification.twisting[k] / self.voronoi[k],
+                natural: specification.natural_twist[k].unwrap_or(self.twists[k]),
+            })
+            .collect()
+    }
+}
+
+fn shape_frames(specification: &Specification, network: &Network, nodes: &[Vec3]) -> ReferenceFrames {
+    let first = |edge: usize| specification.directors.iter().find(|(k, _)| *k == edge).map(|(_, director)| *director);
+    ReferenceFrames::of_shape(network, nodes, &first)
+}
+
+fn coordinates(network: &Network, nodes: &[Vec3], theta: &[f64], dof_count: usize) -> Vec<f64> {
+    let mut q = vec![0.0; dof_count];
+    for (node, &dof) in nodes.iter().zip(network.node_dofs()) {
+        q[dof..dof + 3].copy_from_slice(node.as_slice());
+    }
+    for (&angle, &dof) in theta.iter().zip(network.edge_dofs()) {
+        q[dof] = angle;
+    }
+    q
+}
+
+fn initial_state(specification: &Specification, network: &Network, dof_count: usize) -> State {
+    State {
+        time: 0.0,
+        steps: 0,
+        q: coordinates(network, &specification.nodes, &specification.theta, dof_count),
+        velocity: vec![0.0; dof_count],
+        frames: shape_frames(specification, network, &specification.nodes),
+        motor_angles: vec![0.0; specification.motors.len()],
+        contacts: Vec::new(),
+    }
+}
+
+fn motors(specification: &Specification, first_free: usize) -> Vec<Motor> {
+    let mut next = first_free;
+    specification
+        .motors
+        .iter()
+        .map(|motor| Motor {
+            hinge: motor.hinge,
+            shaft_second: motor.shaft_second,
+            drive: if motor.by_torque {
+                next += 1;
+                Drive::Torque { signal: motor.signal.clone(), dof: next - 1 }
+            } else {
+                Drive::Speed(motor.signal.clone())
+            },
+        })
+        .collect()
+}
+
+fn free_angle(motors: &[Motor], hinge: usize) -> Option<(usize, usize, f64)> {
+    motors.iter().filter(|motor| motor.hinge == hinge).find_map(|motor| match motor.drive {
+        Drive::Torque { dof, .. } => {
+            let (row, sign) = Motor::angle_row(motor.shaft_second);
+            Some((dof, row, sign))
+        }
+        Drive::Speed(_) => None,
+    })
+}
+
+/// Mass of a solid round edge, half on each node, and its moment of inertia `m a^2 / 2` about the centreline.
+fn masses(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
+    let mut mass = vec![0.0; dof_count];
+    for (k, &[i, j]) in network.edges().iter().enumerate() {
+        let radius = specification.radius[k];
+        let own = specification.density[k] * PI * radius * radius * lengths[k];
+        for node in [i, j] {
+            let dof = network.node_dofs()[node];
+            mass[dof..dof + 3].iter_mut().for_each(|m| *m += 0.5 * own);
+        }
+        mass[network.edge_dofs()[k]] = 0.5 * own * radius * radius;
+    }
+    if let Some(head) = &specification.head {
+        let dof = network.node_dofs()[head.node];
+        mass[dof..dof + 3].iter_mut().for_each(|m| *m += head.mass);
+    }
+    mass
+}
+
+fn dissipative_terms(
+    specification: &Specification,
+    network: &Network,
+    dof_count: usize,
+    lengths: &[f64],
+) -> Vec<Box<dyn Term>> {
+    let mut terms: Vec<Box<dyn Term>> = Vec::new();
+    if let Some(fluid) = specification.fluid.as_ref().filter(|fluid| fluid.twist_drag) {
+        let edges: Vec<usize> = (0..network.edges().len()).filter(|&edge| fluid.immersed[edge]).collect();
+        let coefficients = edges
+            .iter()
+            .map(|&edge| 4.0 * PI * fluid.viscosity * specification.radius[edge].powi(2) * lengths[edge])
+            .collect();
+        if !edges.is_empty() {
+            terms.push(Box::new(TwistDrag::new(network, edges, coefficients)));
+        }
+    }
+    if let Some(head) = &specification.head {
+        terms.push(Box::new(Head::new(network, head.node, head.neighbours, head.translation, head.rotation)));
+    }
+    let forces = loads(specification, network, dof_count, lengths);
+    if forces.iter().any(|&force| force != 0.0) {
+        terms.push(Box::new(Loads::new(forces)));
+    }
+    terms
+}
+
+fn loads(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
+    let mut forces = vec![0.0; dof_count];
+    let mut add = |node: usize, force: Vec3| {
+        let dof = network.node_dofs()[node];
+        (0..3).for_each(|c| forces[dof + c] += force[c]);
+    };
+    for &(node, force) in &specification.loads {
+        add(node, force);
+    }
+    for (k, &[i, j]) in network.edges().iter().enumerate() {
+        let buoyancy = specification.fluid.as_ref().map_or(0.0, |fluid| fluid.density);
+        let volume = PI * specification.radius[k].powi(2) * lengths[k];
+        let weight = specification.gravity * ((specification.density[k] - buoyancy) * volume);
+        add(i, weight * 0.5);
+        add(j, weight * 0.5);
+    }
+    if let Some(head) = &specification.head {
+        add(head.node, specification.gravity * head.mass);
+    }
+    forces
+}
+
+fn clamps(specification: &Specification, network: &Network, dof_count: usize) -> (Vec<Clamp>, Vec<bool>) {
+    let mut prescribed = vec![false; dof_count];
+    let clamps = specification
+        .clamps
+        .iter()
+        .map(|clamp| {
+            let nodes: Vec<usize> = clamp.nodes.iter().map(|&node| network.node_dofs()[node]).collect();
+            let edges: Vec<usize> = clamp.edges.iter().map(|&edge| network.edge_dofs()[edge]).collect();
+            nodes.iter().for_each(|&dof| prescribed[dof..dof + 3].fill(true));
+            edges.iter().for_each(|&dof| prescribed[dof] = true);
+            Clamp { nodes, edges, angular_velocity: clamp.angular_velocity.clone(), velocity: clamp.velocity }
+        })
+        .collect();
+    (clamps, prescribed)
+}

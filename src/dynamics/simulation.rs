@@ -1,0 +1,376 @@
+//! A simulation: steps a model's state, retries with smaller steps, and keeps the last good state.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::balance::{Balance, Step};
+use super::model::{Model, ModelError};
+use super::newton::{self, NewtonSettings, NewtonWork};
+use super::scheme::Scheme;
+use super::specification::Specification;
+use super::state::State;
+use super::statistics::Statistics;
+use super::threads;
+use crate::Vec3;
+use crate::contact::spillmann::ContactSolver;
+use crate::elastic::motors::Drive;
+use crate::elastic::signal::SignalError;
+use crate::linear::LinearError;
+use crate::rod::configuration::ReferenceFrames;
+
+/// A step was not possible; the simulation stands at its last good state.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The equations of a step could not be solved, however small the step.
+    #[error(
+        "no convergence at t = {time} s (step {step}): {reason}; residual {residual:.3e} N after {iterations} iterations with \
+         dt = {dt:.3e} s, worst at node {worst_node}"
+    )]
+    Convergence {
+        /// Time of the last good state, s.
+        time: f64,
+        /// Number of the step.
+        step: u64,
+        /// Smallest step tried, s.
+        dt: f64,
+        /// Residual force, N.
+        residual: f64,
+        /// Newton iterations of the last try.
+        iterations: usize,
+        /// Smallest gap between surfaces at the last good state, m.
+        smallest_gap: f64,
+        /// Node with the largest residual.
+        worst_node: usize,
+        /// What went wrong.
+        reason: String,
+    },
+    /// A motor's or clamp's function of time failed.
+    #[error("a function of time failed: {0}")]
+    Signal(SignalError),
+}
+
+/// Why one try at a step failed.
+enum TryError {
+    Signal(SignalError),
+    Solve { residual: f64, iterations: usize, worst: usize, reason: String },
+}
+
+impl From<LinearError> for TryError {
+    fn from(error: LinearError) -> Self {
+        Self::Solve { residual: f64::NAN, iterations: 0, worst: 0, reason: error.to_string() }
+    }
+}
+
+impl From<SignalError> for TryError {
+    fn from(error: SignalError) -> Self {
+        Self::Signal(error)
+    }
+}
+
+/// How often a step may be halved.
+const HALVINGS: u32 = 12;
+
+/// A model, its state, and the workspace that takes it forward.
+pub struct Simulation {
+    pub(super) model: Model,
+    pub(super) state: State,
+    pub(super) balance: Balance,
+    scheme: Scheme,
+    dt: f64,
+    settings: NewtonSettings,
+    work: NewtonWork,
+    contact: Option<ContactSolver>,
+    statistics: Statistics,
+    fluid_step: Option<u64>,
+    q: Vec<f64>,
+    positions: Vec<Vec3>,
+    stiffness: Vec<f64>,
+}
+
+impl Simulation {
+    /// A simulation of a specification with steps of `dt` seconds.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming what is not valid.
+    pub fn new(specification: Specification, scheme: Scheme, dt: f64, thread_count: usize) -> Result<Self, ModelError> {
+        let (model, state) = Model::new(specification)?;
+        let pool = threads::pool(thread_count);
+        let balance = Balance::new(&model, pool.as_ref().map(Arc::clone))?;
+        let contact = model.contact.as_ref().map(ContactSolver::new);
+        Ok(Self {
+            work: NewtonWork::new(model.dof_count),
+            q: state.q.clone(),
+            positions: state.positions(&model.network),
+            stiffness: Vec::new(),
+            settings: NewtonSettings::default(),
+            statistics: Statistics::default(),
+            fluid_step: None,
+            model,
+            state,
+            balance,
+            scheme,
+            dt,
+            contact,
+        })
+    }
+
+    /// The constant part.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The last good state.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// The scheme.
+    pub fn scheme(&self) -> Scheme {
+        self.scheme
+    }
+
+    /// Length of a step, s.
+    pub fn dt(&self) -> f64 {
+        self.dt
+    }
+
+    /// Changes the length of a step, s.
+    pub fn set_dt(&mut self, dt: f64) {
+        self.dt = dt;
+    }
+
+    /// Counts and times.
+    pub fn statistics(&self) -> Statistics {
+        self.statistics
+    }
+
+    /// The fluid no longer stands where the next step needs it.
+    pub(super) fn forget_fluid(&mut self) {
+        self.fluid_step = None;
+    }
+
+    /// Takes over a saved state of the same model.
+    pub fn restore(&mut self, state: State) {
+        self.state = state;
+        self.fluid_step = None;
+    }
+
+    /// Moves nodes and, if given, edge angles; at rest. Frames are transported from those of the last accepted state, so
+    /// that the result depends on the positions alone and not on a path to them.
+    ///
+    /// # Errors
+    /// [`ModelError::Shape`] if the positions are not a configuration; the state is unchanged.
+    pub fn place(&mut self, nodes: &[Vec3], theta: Option<&[f64]>) -> Result<(), ModelError> {
+        let mut state = self.state.clone();
+        let network = &self.model.network;
+        for (node, &dof) in nodes.iter().zip(network.node_dofs()) {
+            state.q[dof..dof + 3].copy_from_slice(node.as_slice());
+        }
+        for (&angle, &dof) in theta.unwrap_or_default().iter().zip(network.edge_dofs()) {
+            state.q[dof] = angle;
+        }
+        state.velocity.fill(0.0);
+        rebase(&mut state.frames, network.edges(), nodes);
+        if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
+            return Err(ModelError::Shape { shape: "nodes" });
+        }
+        self.restore(state);
+        Ok(())
+    }
+
+    /// Advances by one step of `dt`, in as many smaller ones as it takes.
+    ///
+    /// # Errors
+    /// [`StepError`]; the state is that of the last accepted (smaller) step.
+    pub fn step(&mut self) -> Result<(), StepError> {
+        self.advance(self.dt)
+    }
+
+    /// Advances by the given time in one step or, where that does not converge, in several.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn advance(&mut self, duration: f64) -> Result<(), StepError> {
+        let start = Instant::now();
+        let (mut left, mut part) = (duration, duration);
+        let smallest = duration * 0.5_f64.powi(HALVINGS as i32);
+        let result = loop {
+            if left <= 0.5 * smallest {
+                break Ok(());
+            }
+            let dt = part.min(left);
+            match self.try_step(dt) {
+                Ok(()) => left -= dt,
+                Err(TryError::Signal(error)) => break Err(StepError::Signal(error)),
+                Err(TryError::Solve { residual, iterations, worst, reason }) => {
+                    self.statistics.rejected_steps += 1;
+                    part = 0.5 * dt;
+                    if part < smallest {
+                        break Err(self.convergence_error(dt, residual, iterations, worst, reason));
+                    }
+                }
+            }
+        };
+        self.statistics.seconds_total += start.elapsed().as_secs_f64();
+        result
+    }
+
+    fn convergence_error(&self, dt: f64, residual: f64, iterations: usize, worst: usize, reason: String) -> StepError {
+        let dofs = self.model.network.node_dofs();
+        StepError::Convergence {
+            time: self.state.time,
+            step: self.state.steps,
+            dt,
+            residual,
+            iterations,
+            smallest_gap: self.smallest_gap().unwrap_or(f64::INFINITY),
+            worst_node: dofs.partition_point(|&dof| dof <= worst).saturating_sub(1),
+            reason,
+        }
+    }
+
+    fn try_step(&mut self, dt: f64) -> Result<(), TryError> {
+        let (t0, t1) = (self.state.time, self.state.time + dt);
+        let mut target = std::mem::take(&mut self.q);
+        let prepared = self.prepare(&mut target, t0, t1);
+        let solved = prepared.and_then(|step| self.solve(step, &mut target));
+        self.q = target;
+        self.accept(solved?, dt);
+        Ok(())
+    }
+
+    /// Motor angles and torques at the end of the step; the prescribed degrees of freedom of `target` are set to it.
+    fn prepare(&self, target: &mut [f64], t0: f64, t1: f64) -> Result<(Vec<f64>, Vec<f64>, f64), TryError> {
+        let mut angles = self.state.motor_angles.clone();
+        let mut torques = vec![0.0; angles.len()];
+        for (k, motor) in self.model.motors.iter().enumerate() {
+            match &motor.drive {
+                Drive::Speed(signal) => angles[k] += signal.integral(t0, t1)?,
+                Drive::Torque { signal, .. } => torques[k] = signal.value(t1)?,
+            }
+        }
+        for (k, (&q, &rate)) in self.state.q.iter().zip(&self.state.velocity).enumerate() {
+            target[k] = q + (t1 - t0) * rate;
+        }
+        for clamp in &self.model.clamps {
+            for &dof in &clamp.nodes {
+                (0..3).for_each(|c| target[dof + c] = self.state.q[dof + c] + (t1 - t0) * clamp.velocity[c]);
+            }
+            if !clamp.edges.is_empty() {
+                let turn = clamp.angular_velocity.integral(t0, t1)?;
+                clamp.edges.iter().for_each(|&dof| target[dof] = self.state.q[dof] + turn);
+            }
+        }
+        Ok((angles, torques, t1 - t0))
+    }
+
+    fn solve(&mut self, (angles, torques, dt): (Vec<f64>, Vec<f64>, f64), q: &mut [f64]) -> Result<Vec<f64>, TryError> {
+        let Self { model, state, balance, scheme, settings, work, contact, statistics, positions, stiffness, .. } =
+            self;
+        if self.fluid_step != Some(state.steps) {
+            positions
+                .iter_mut()
+                .zip(model.network.node_dofs())
+                .for_each(|(x, &dof)| *x = crate::rod::configuration::node(&state.q, dof));
+            self.fluid_step = None;
+            balance.place_fluid(positions, statistics)?;
+            self.fluid_step = Some(state.steps);
+        }
+        let step = Step { scheme: *scheme, state, dt, motor_angles: angles, motor_torques: torques };
+        balance.begin(&step)?;
+        choose_guess(balance, model, &step, q, statistics);
+        let failed = |failure: newton::NewtonFailure| TryError::Solve {
+            residual: failure.residual,
+            iterations: failure.iterations,
+            worst: failure.worst,
+            reason: failure.reason,
+        };
+        let (Some(law), Some(contact)) = (&model.contact, contact) else {
+            newton::solve(balance, model, &step, settings, work, q, statistics).map_err(failed)?;
+            return Ok(step.motor_angles);
+        };
+        let dofs = model.network.node_dofs();
+        let place = |q: &[f64], positions: &mut [Vec3]| {
+            positions.iter_mut().zip(dofs).for_each(|(x, &dof)| *x = crate::rod::configuration::node(q, dof));
+        };
+        contact.begin(&state.contacts);
+        balance.node_stiffness(model, &step, stiffness);
+        place(&state.q, positions);
+        let mut violation = f64::INFINITY;
+        for _ in 0..law.max_iterations() {
+            balance.set_contact(|add| contact.spread(law, positions, add), dofs);
+            newton::solve(balance, model, &step, settings, work, q, statistics).map_err(failed)?;
+            place(q, positions);
+            let start = Instant::now();
+            let loaded = !contact.forces().is_empty();
+            let pass = contact.pass(law, positions, stiffness);
+            statistics.seconds_contact += start.elapsed().as_secs_f64();
+            statistics.contact_iterations += u64::from(loaded || pass.pushing > 0);
+            violation = pass.violation;
+            if violation <= law.tolerance() {
+                return Ok(step.motor_angles);
+            }
+        }
+        Err(TryError::Solve {
+            residual: f64::NAN,
+            iterations: law.max_iterations(),
+            worst: 0,
+            reason: format!("contact left an overlap of {violation:.2e} of the sum of radii"),
+        })
+    }
+
+    fn accept(&mut self, angles: Vec<f64>, dt: f64) {
+        let state = &mut self.state;
+        for ((velocity, new), old) in state.velocity.iter_mut().zip(&self.q).zip(&state.q) {
+            *velocity = (new - old) / dt;
+        }
+        std::mem::swap(&mut state.q, &mut self.q);
+        self.balance.configuration().accept(&mut state.frames);
+        state.time += dt;
+        state.steps += 1;
+        for (k, motor) in self.model.motors.iter().enumerate() {
+            state.motor_angles[k] = motor.shaft(angles[k], &state.q).angle;
+        }
+        if let Some(contact) = &self.contact {
+            state.contacts.clear();
+            state.contacts.extend_from_slice(contact.forces());
+        }
+        self.statistics.steps += 1;
+    }
+}
+
+/// The extrapolated state is a good guess once the motion is steady and a bad one after a jump: take the better.
+fn choose_guess(balance: &mut Balance, model: &Model, step: &Step, q: &mut [f64], statistics: &mut Statistics) {
+    if step.state.velocity.iter().all(|&rate| rate == 0.0) {
+        return;
+    }
+    let ahead = balance.evaluate(model, step, q, statistics);
+    let standing: Vec<f64> = q
+        .iter()
+        .zip(&step.state.q)
+        .zip(&model.prescribed)
+        .map(|((&moved, &old), &prescribed)| if prescribed { moved } else { old })
+        .collect();
+    let standing_size = balance.evaluate(model, step, &standing, statistics);
+    let better = match (ahead, standing_size) {
+        (Some(ahead), Some(standing)) => standing.merit < ahead.merit,
+        (ahead, _) => ahead.is_none(),
+    };
+    if better {
+        q.copy_from_slice(&standing);
+    }
+}
+
+/// Gives edges that have turned over completely since the reference a reference of their own: transport from
+/// antiparallel tangents is not unique.
+fn rebase(frames: &mut ReferenceFrames, edges: &[[usize; 2]], nodes: &[Vec3]) {
+    for (k, &[i, j]) in edges.iter().enumerate() {
+        let vector = nodes[j] - nodes[i];
+        let t = vector / vector.norm();
+        if 1.0 + frames.tangents[k].dot(&t) < 1e-4 {
+            frames.directors[k] = crate::rod::frames::transport_through(&frames.directors[k], &frames.tangents[k], &t);
+            frames.tangents[k] = t;
+        }
+    }
+}

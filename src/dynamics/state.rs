@@ -1,0 +1,31 @@
+//! The changing part of a simulation: plain data, copied and restored to the last bit.
+
+use crate::Vec3;
+use crate::rod::configuration::{ReferenceFrames, node};
+use crate::rod::network::Network;
+
+/// A state of the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// Time, s.
+    pub time: f64,
+    /// Accepted steps since the start.
+    pub steps: u64,
+    /// Degrees of freedom: positions (m), edge angles (rad), free motor angles (rad).
+    pub q: Vec<f64>,
+    /// Their rates over the last step.
+    pub velocity: Vec<f64>,
+    /// Reference frames of this state.
+    pub frames: ReferenceFrames,
+    /// Angle of every motor, rad.
+    pub motor_angles: Vec<f64>,
+    /// Contact multipliers of the last step: pairs of edges and accumulated displacement, m.
+    pub contacts: Vec<([u32; 2], f64)>,
+}
+
+impl State {
+    /// Positions of all nodes, m.
+    pub fn positions(&self, network: &Network) -> Vec<Vec3> {
+        network.node_dofs().iter().map(|&dof| node(&self.q, dof)).collect()
+    }
+}

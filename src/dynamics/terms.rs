@@ -1,0 +1,72 @@
+//! Inertia and loads.
+
+use crate::linear::pattern::Pattern;
+use crate::rod::assembly::{Assembly, Element, Increment, Term};
+use crate::rod::configuration::Configuration;
+
+/// Lumped inertia, implicit: `M (q - q_n - dt v_n) / dt^2` (equation 9).
+pub struct Inertia {
+    mass: Vec<f64>,
+    elements: Vec<Element>,
+}
+
+impl Inertia {
+    /// `mass` of every degree of freedom: kg for positions, kg m^2 for angles, zero for those without inertia.
+    pub fn new(mass: Vec<f64>) -> Self {
+        let elements = (0..mass.len()).map(|dof| Element::new(vec![dof])).collect();
+        Self { mass, elements }
+    }
+}
+
+impl Term for Inertia {
+    fn name(&self) -> &'static str {
+        "inertia"
+    }
+
+    fn stencils(&self) -> Vec<Vec<usize>> {
+        Vec::new()
+    }
+
+    fn bind(&mut self, pattern: &Pattern) {
+        self.elements.iter_mut().for_each(|element| element.bind(pattern));
+    }
+
+    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
+        let dt = increment.dt;
+        for (dof, (&mass, element)) in self.mass.iter().zip(&self.elements).enumerate() {
+            let ahead = configuration.q()[dof] - increment.previous[dof] - dt * increment.velocity[dof];
+            let rate = mass / (dt * dt);
+            element.add(&[rate * ahead], Some(&[rate]), out);
+        }
+    }
+}
+
+/// Forces that do not depend on the state: point loads, weight less buoyancy.
+pub struct Loads {
+    forces: Vec<f64>,
+}
+
+impl Loads {
+    /// Generalised force on every degree of freedom.
+    pub fn new(forces: Vec<f64>) -> Self {
+        Self { forces }
+    }
+}
+
+impl Term for Loads {
+    fn name(&self) -> &'static str {
+        "loads"
+    }
+
+    fn stencils(&self) -> Vec<Vec<usize>> {
+        Vec::new()
+    }
+
+    fn bind(&mut self, _: &Pattern) {}
+
+    fn add(&self, _: &Configuration, _: &Increment, out: &mut Assembly) {
+        for (residual, force) in out.residual.iter_mut().zip(&self.forces) {
+            *residual -= force;
+        }
+    }
+}

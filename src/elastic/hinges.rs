@@ -1,0 +1,70 @@
+//! The hinges' term: bending and twisting of every hinge, added in one pass over its strains.
+
+use super::bending::Bending;
+use super::twisting::Twisting;
+use crate::linear::pattern::Pattern;
+use crate::rod::assembly::{Assembly, HingeElement, Increment, Term};
+use crate::rod::configuration::Configuration;
+use crate::rod::strain::{Gradient8, Hessian8};
+
+/// Bending and twisting of every hinge of a network.
+pub struct Hinges {
+    elements: Vec<HingeElement>,
+    bending: Vec<Bending>,
+    twisting: Vec<Twisting>,
+}
+
+impl Hinges {
+    /// One element, bending and twisting law per hinge.
+    pub fn new(elements: Vec<HingeElement>, bending: Vec<Bending>, twisting: Vec<Twisting>) -> Self {
+        Self { elements, bending, twisting }
+    }
+
+    /// Bending energy, J.
+    pub fn bending_energy(&self, configuration: &Configuration) -> f64 {
+        self.bending.iter().enumerate().map(|(k, law)| law.energy(configuration.strain(k))).sum()
+    }
+
+    /// Twisting energy, J.
+    pub fn twisting_energy(&self, configuration: &Configuration) -> f64 {
+        self.twisting.iter().enumerate().map(|(k, law)| law.energy(configuration.strain(k))).sum()
+    }
+
+    /// Derivative of a hinge's energy with respect to the angles of its first and second edge, N m.
+    pub fn moments(&self, hinge: usize, configuration: &Configuration) -> [f64; 2] {
+        let mut gradient = Gradient8::zeros();
+        let strain = configuration.strain(hinge);
+        self.bending[hinge].add(strain, &mut gradient, None);
+        self.twisting[hinge].add(strain, &mut gradient, None);
+        [gradient[crate::rod::strain::THETA_E], gradient[crate::rod::strain::THETA_F]]
+    }
+}
+
+impl Term for Hinges {
+    fn name(&self) -> &'static str {
+        "bending and twisting"
+    }
+
+    fn stencils(&self) -> Vec<Vec<usize>> {
+        self.elements.iter().map(|element| element.dofs().to_vec()).collect()
+    }
+
+    fn bind(&mut self, pattern: &Pattern) {
+        self.elements.iter_mut().for_each(|element| element.bind(pattern));
+    }
+
+    fn energy(&self, configuration: &Configuration) -> f64 {
+        self.bending_energy(configuration) + self.twisting_energy(configuration)
+    }
+
+    fn add(&self, configuration: &Configuration, _: &Increment, out: &mut Assembly) {
+        for (k, element) in self.elements.iter().enumerate() {
+            let strain = configuration.strain(k);
+            let mut gradient = Gradient8::zeros();
+            let mut hessian = out.jacobian.is_some().then(Hessian8::zeros);
+            self.bending[k].add(strain, &mut gradient, hessian.as_mut());
+            self.twisting[k].add(strain, &mut gradient, hessian.as_mut());
+            element.add(configuration, gradient, hessian, out);
+        }
+    }
+}

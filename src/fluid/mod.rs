@@ -1,0 +1,64 @@
+//! The viscous fluid: models of the force it exerts on moving filaments, behind one trait.
+//!
+//! * [`segment`]: integrals of a regularized Stokeslet over a straight segment (all `unsafe` of the crate).
+//! * [`stokeslet`]: mobility matrix, velocity field and hat-function weights of segment networks.
+//! * [`rss`]: nonlocal drag by regularized Stokeslet segments.
+//! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
+//! * [`twist_drag`]: resistance of an edge to spinning about its own centreline.
+//! * [`head`]: drag and counter-torque of the seed's head.
+
+pub mod head;
+pub mod rft;
+pub mod rss;
+pub mod segment;
+pub mod stokeslet;
+pub mod twist_drag;
+
+use crate::linear::LinearError;
+use crate::{Mat3, Vec3};
+
+/// A model of the drag on the immersed part of a rod network, at a fixed geometry.
+///
+/// Vectors over the immersed nodes hold three components per node, in the order of [`Self::immersed`].
+pub trait FluidModel: Send + Sync {
+    /// What the model is called.
+    fn name(&self) -> &'static str;
+
+    /// The nodes the fluid acts on, ascending.
+    fn immersed(&self) -> &[usize];
+
+    /// Moves to a new geometry, given every node of the scene.
+    ///
+    /// # Errors
+    /// If the resistance does not exist there.
+    fn update(&mut self, nodes: &[Vec3], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError>;
+
+    /// Force that drags the immersed nodes through the fluid at the given velocities, N; in place.
+    ///
+    /// # Errors
+    /// If the solve fails.
+    fn resist(&mut self, velocity: &mut [f64]) -> Result<(), LinearError>;
+
+    /// Force per length on the fluid at the given nodal velocities, N/m; in place.
+    ///
+    /// # Errors
+    /// If the solve fails.
+    fn force_density(&mut self, velocity: &mut [f64]) -> Result<(), LinearError>;
+
+    /// Resistance of every immersed node on its own, N s/m: the whole model if it is local, else a preconditioner.
+    fn local(&self) -> &[Mat3];
+
+    /// Whether [`Self::local`] is the whole model.
+    fn is_local(&self) -> bool;
+}
+
+/// Ascending nodes of the immersed edges, and these edges in that numbering.
+pub(crate) fn immersed_part(edges: &[[usize; 2]], immersed: &[bool]) -> (Vec<usize>, Vec<[usize; 2]>, Vec<usize>) {
+    let chosen: Vec<usize> = (0..edges.len()).filter(|&edge| immersed[edge]).collect();
+    let mut nodes: Vec<usize> = chosen.iter().flat_map(|&edge| edges[edge]).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let place = |node: usize| nodes.partition_point(|&other| other < node);
+    let local = chosen.iter().map(|&edge| edges[edge].map(place)).collect();
+    (nodes, local, chosen)
+}

@@ -1,0 +1,34 @@
+//! Linear algebra without any knowledge of rods: a fixed sparse pattern, sparse and dense factorizations, a Krylov method.
+//!
+//! * [`pattern`]: which entries a sum of small dense element matrices touches, and where each of them is stored.
+//! * [`sparse`]: LU of a matrix on such a pattern (faer).
+//! * [`dense`]: LU of a dense unsymmetric matrix (faer).
+//! * [`krylov`]: right-preconditioned GMRES for operators that are only known by their action.
+
+pub mod dense;
+pub mod krylov;
+pub mod pattern;
+pub mod sparse;
+
+/// A linear system could not be solved.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinearError {
+    /// The matrix is singular, structurally or to working precision.
+    #[error("the {what} matrix is singular to working precision")]
+    Singular {
+        /// Which matrix.
+        what: &'static str,
+    },
+    /// The symbolic analysis failed.
+    #[error("symbolic analysis of the sparse matrix failed: {0}")]
+    Symbolic(String),
+    /// The Krylov method did not reach its tolerance.
+    #[error("GMRES stopped at a relative residual of {residual:.2e} after {iterations} iterations")]
+    Krylov {
+        /// Relative residual reached.
+        residual: f64,
+        /// Iterations made.
+        iterations: usize,
+    },
+}

@@ -1,0 +1,28 @@
+//! The Python face of the crate: thin classes and functions over arrays, nothing of the mechanics.
+//!
+//! * [`specification`]: a scene's plain data from a mapping of arrays.
+//! * [`simulation`]: the simulation class.
+//! * [`numerics`]: mobility, velocity and distances on plain arrays.
+//! * [`errors`]: errors of the core as Python exceptions.
+//! * [`arrays`]: positions and indices in and out of NumPy.
+
+mod arrays;
+mod errors;
+mod numerics;
+mod simulation;
+mod specification;
+
+use pyo3::prelude::*;
+
+/// Native core of flagrs; use the package `flagrs`.
+#[pymodule]
+fn _flagrs(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<simulation::Simulation>()?;
+    module.add_function(wrap_pyfunction!(numerics::mobility, module)?)?;
+    module.add_function(wrap_pyfunction!(numerics::velocity, module)?)?;
+    module.add_function(wrap_pyfunction!(numerics::hat_weights, module)?)?;
+    module.add_function(wrap_pyfunction!(numerics::segment_distance, module)?)?;
+    module.add_function(wrap_pyfunction!(numerics::thread_count, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,318 @@
+//! The simulation class: a scene's state and the steps that take it forward.
+
+use std::time::{Duration, Instant};
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::arrays::{from_flat, from_points, points, values};
+use super::errors::{linear_error, model_error, scene_error, step_error};
+use super::specification::SceneInput;
+use crate::dynamics::scheme::Scheme;
+use crate::dynamics::simulation as core;
+use crate::dynamics::state::State;
+use crate::rod::configuration::ReferenceFrames;
+
+/// How often a long computation looks for Ctrl-C.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// A running simulation; the class `flagrs.Simulation` wraps it.
+#[pyclass(module = "flagrs._flagrs")]
+pub struct Simulation {
+    inner: core::Simulation,
+}
+
+type Hessian<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    fn new(py: Python<'_>, scene: SceneInput<'_>, scheme: &str, dt: f64, threads: usize) -> PyResult<Self> {
+        let scheme = Scheme::from_name(scheme)
+            .ok_or_else(|| scene_error(py, "scheme", scheme, "one of explicit, implicit, overdamped"))?;
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(scene_error(py, "dt", &dt.to_string(), "> 0 s"));
+        }
+        let specification = scene.specification(py)?;
+        let inner = core::Simulation::new(specification, scheme, dt, threads).map_err(|e| model_error(py, &e))?;
+        if let Some((depth, [a, b])) = inner.deepest_overlap() {
+            let value = format!("edges {a} and {b}, which overlap by {depth:.3e} m");
+            return Err(scene_error(py, "nodes", &value, "an initial shape without overlaps"));
+        }
+        Ok(Self { inner })
+    }
+
+    fn __repr__(&self) -> String {
+        let network = self.inner.model().network();
+        format!(
+            "Simulation({} nodes, {} edges, scheme={:?}, dt={:e} s, time={} s)",
+            network.node_count(),
+            network.edges().len(),
+            self.inner.scheme().name(),
+            self.inner.dt(),
+            self.inner.state().time
+        )
+    }
+
+    /// Makes `count` steps of `dt`.
+    fn step(&mut self, py: Python<'_>, count: u64) -> PyResult<()> {
+        let inner = &mut self.inner;
+        let mut looked = Instant::now();
+        py.detach(|| {
+            for _ in 0..count {
+                inner.step().map_err(|error| Python::attach(|py| step_error(py, error)))?;
+                if looked.elapsed() > SIGNAL_INTERVAL {
+                    looked = Instant::now();
+                    Python::attach(|py| py.check_signals())?;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// Advances by `duration` seconds in one step.
+    fn advance(&mut self, py: Python<'_>, duration: f64) -> PyResult<()> {
+        let inner = &mut self.inner;
+        py.detach(|| inner.advance(duration)).map_err(|error| step_error(py, error))?;
+        py.check_signals()
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.inner.state().time
+    }
+
+    #[getter]
+    fn dt(&self) -> f64 {
+        self.inner.dt()
+    }
+
+    #[setter]
+    fn set_dt(&mut self, py: Python<'_>, dt: f64) -> PyResult<()> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(scene_error(py, "dt", &dt.to_string(), "> 0 s"));
+        }
+        self.inner.set_dt(dt);
+        Ok(())
+    }
+
+    #[getter]
+    fn scheme(&self) -> &'static str {
+        self.inner.scheme().name()
+    }
+
+    #[getter]
+    fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        from_points(py, &self.inner.positions())
+    }
+
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        from_points(py, &self.inner.velocities())
+    }
+
+    #[getter]
+    fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let state = self.inner.state();
+        PyArray1::from_iter(py, self.inner.model().network().edge_dofs().iter().map(|&dof| state.q[dof]))
+    }
+
+    /// Degrees of freedom and their rates, in the interleaved numbering.
+    #[getter]
+    fn velocity_vector<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.state().velocity)
+    }
+
+    #[getter]
+    fn dof_of_node<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.inner.model().network().node_dofs().iter().map(|&dof| dof as i64))
+    }
+
+    #[getter]
+    fn dof_of_edge<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.inner.model().network().edge_dofs().iter().map(|&dof| dof as i64))
+    }
+
+    #[getter]
+    fn dof_count(&self) -> usize {
+        self.inner.model().dof_count()
+    }
+
+    #[getter]
+    fn mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.inner.model().mass())
+    }
+
+    #[getter]
+    fn terms(&self) -> Vec<&'static str> {
+        self.inner.model().term_names()
+    }
+
+    /// Moves nodes and edge angles; at rest.
+    #[pyo3(signature = (nodes, theta=None))]
+    fn place(
+        &mut self,
+        py: Python<'_>,
+        nodes: PyReadonlyArray2<'_, f64>,
+        theta: Option<PyReadonlyArray1<'_, f64>>,
+    ) -> PyResult<()> {
+        let network = self.inner.model().network();
+        let (count, edges) = (network.node_count(), network.edges().len());
+        let nodes = points(py, "nodes", &nodes)?;
+        let theta = theta.as_ref().map(values);
+        if nodes.len() != count {
+            return Err(scene_error(
+                py,
+                "nodes",
+                &format!("shape ({}, 3)", nodes.len()),
+                &format!("of shape ({count}, 3)"),
+            ));
+        }
+        if let Some(theta) = theta.as_ref().filter(|theta| theta.len() != edges || theta.iter().any(|t| !t.is_finite()))
+        {
+            let allowed = format!("{edges} finite angles");
+            return Err(scene_error(py, "theta", &format!("{theta:?}"), &allowed));
+        }
+        self.inner.place(&nodes, theta.as_deref()).map_err(|error| model_error(py, &error))
+    }
+
+    /// Energies of stretching, bending and twisting, J.
+    fn energies(&mut self) -> [f64; 3] {
+        self.inner.energies()
+    }
+
+    /// Elastic gradient, (ndof,).
+    fn gradient<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.inner.elastic_derivatives().0)
+    }
+
+    /// Elastic Hessian: values, row indices and column starts of compressed columns.
+    fn hessian<'py>(&mut self, py: Python<'py>) -> Hessian<'py> {
+        let (_, hessian) = self.inner.elastic_derivatives();
+        let pattern = self.inner.model().pattern();
+        let indices = |values: &[usize]| PyArray1::from_iter(py, values.iter().map(|&value| value as i64));
+        (PyArray1::from_vec(py, hessian), indices(pattern.row_indices()), indices(pattern.column_starts()))
+    }
+
+    /// Resistance of the nodes, (3N, 3N), N s/m.
+    fn resistance<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let size = 3 * self.inner.model().network().node_count();
+        let inner = &mut self.inner;
+        let flat = py.detach(|| inner.resistance()).map_err(|error| linear_error(py, &error))?;
+        PyArray1::from_vec(py, flat).reshape_with_order([size, size], numpy::npyffi::NPY_ORDER::NPY_FORTRANORDER)
+    }
+
+    /// Everything a saved frame holds but the time, as a mapping of arrays.
+    fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let frame = PyDict::new(py);
+        let density = self.inner.force_density().map_err(|error| linear_error(py, &error))?;
+        frame.set_item("time", self.inner.state().time)?;
+        frame.set_item("nodes", self.nodes(py)?)?;
+        frame.set_item("theta", self.theta(py))?;
+        frame.set_item("velocities", self.velocities(py)?)?;
+        frame.set_item("force_density", from_flat(py, density, 3)?)?;
+        frame.set_item("motor_angle", PyArray1::from_slice(py, &self.inner.state().motor_angles))?;
+        frame.set_item("motor_speed", PyArray1::from_vec(py, self.inner.motor_speeds()))?;
+        frame.set_item("motor_torque", PyArray1::from_vec(py, self.inner.motor_torques()))?;
+        frame.set_item("minimum_gap", self.inner.smallest_gap().unwrap_or(f64::INFINITY))?;
+        frame.set_item("contacts", self.inner.state().contacts.len())?;
+        frame.set_item("energy", PyArray1::from_slice(py, &self.inner.energies()))?;
+        Ok(frame)
+    }
+
+    /// Counts and times since the start.
+    fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (statistics, out) = (self.inner.statistics(), PyDict::new(py));
+        out.set_item("steps", statistics.steps)?;
+        out.set_item("rejected_steps", statistics.rejected_steps)?;
+        out.set_item("newton_iterations", statistics.newton_iterations)?;
+        out.set_item("krylov_iterations", statistics.krylov_iterations)?;
+        out.set_item("dense_solves", statistics.dense_solves)?;
+        out.set_item("contact_iterations", statistics.contact_iterations)?;
+        out.set_item("seconds_fluid", statistics.seconds_fluid)?;
+        out.set_item("seconds_assembly", statistics.seconds_assembly)?;
+        out.set_item("seconds_linear", statistics.seconds_linear)?;
+        out.set_item("seconds_contact", statistics.seconds_contact)?;
+        out.set_item("seconds_total", statistics.seconds_total)?;
+        Ok(out)
+    }
+
+    /// The whole state as a mapping of arrays, exact to the last bit.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (state, out) = (self.inner.state(), PyDict::new(py));
+        let pairs = state.contacts.iter().flat_map(|(pair, _)| pair.map(i64::from));
+        out.set_item("time", PyArray1::from_slice(py, &[state.time]))?;
+        out.set_item("steps", PyArray1::from_slice(py, &[state.steps]))?;
+        out.set_item("q", PyArray1::from_slice(py, &state.q))?;
+        out.set_item("velocity", PyArray1::from_slice(py, &state.velocity))?;
+        out.set_item("tangents", from_points(py, &state.frames.tangents)?)?;
+        out.set_item("directors", from_points(py, &state.frames.directors)?)?;
+        out.set_item("twists", PyArray1::from_slice(py, &state.frames.twists))?;
+        out.set_item("motor_angles", PyArray1::from_slice(py, &state.motor_angles))?;
+        out.set_item("contact_pairs", PyArray1::from_iter(py, pairs).reshape([state.contacts.len(), 2])?)?;
+        out.set_item("contact_forces", PyArray1::from_iter(py, state.contacts.iter().map(|(_, force)| *force)))?;
+        Ok(out)
+    }
+
+    /// Takes over a state saved by `state()` of a simulation of the same scene.
+    fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
+        let current = self.inner.state();
+        let state = State {
+            time: first(&saved.time),
+            steps: saved.steps.as_array().first().copied().unwrap_or(0),
+            q: values(&saved.q),
+            velocity: values(&saved.velocity),
+            frames: ReferenceFrames {
+                tangents: points(py, "tangents", &saved.tangents)?,
+                directors: points(py, "directors", &saved.directors)?,
+                twists: values(&saved.twists),
+            },
+            motor_angles: values(&saved.motor_angles),
+            contacts: contacts(&saved),
+        };
+        let same = state.q.len() == current.q.len()
+            && state.velocity.len() == current.velocity.len()
+            && state.frames.tangents.len() == current.frames.tangents.len()
+            && state.frames.directors.len() == current.frames.directors.len()
+            && state.frames.twists.len() == current.frames.twists.len()
+            && state.motor_angles.len() == current.motor_angles.len();
+        let finite = state.time.is_finite() && state.q.iter().chain(&state.velocity).all(|value| value.is_finite());
+        if !(same && finite) {
+            return Err(scene_error(py, "state", "the saved state", "a finite state of the same scene"));
+        }
+        self.inner.restore(state);
+        Ok(())
+    }
+}
+
+/// A saved state.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct StateInput<'py> {
+    time: PyReadonlyArray1<'py, f64>,
+    steps: PyReadonlyArray1<'py, u64>,
+    q: PyReadonlyArray1<'py, f64>,
+    velocity: PyReadonlyArray1<'py, f64>,
+    tangents: PyReadonlyArray2<'py, f64>,
+    directors: PyReadonlyArray2<'py, f64>,
+    twists: PyReadonlyArray1<'py, f64>,
+    motor_angles: PyReadonlyArray1<'py, f64>,
+    contact_pairs: PyReadonlyArray2<'py, i64>,
+    contact_forces: PyReadonlyArray1<'py, f64>,
+}
+
+fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
+    array.as_array().first().copied().unwrap_or(f64::NAN)
+}
+
+fn contacts(saved: &StateInput<'_>) -> Vec<([u32; 2], f64)> {
+    saved
+        .contact_pairs
+        .as_array()
+        .rows()
+        .into_iter()
+        .zip(saved.contact_forces.as_array())
+        .map(|(pair, &force)| ([pair[0] as u32, pair[1] as u32], force))
+        .collect()
+}

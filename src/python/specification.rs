@@ -1,0 +1,189 @@
+//! A scene's plain data from a mapping of arrays, as `flagrs.assemble` makes it.
+
+use std::sync::Arc;
+
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::prelude::*;
+
+use super::arrays::{pairs, points, values};
+use crate::Vec3;
+use crate::dynamics::specification::{
+    ClampSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification, HeadSpecification,
+    MotorSpecification, Specification,
+};
+use crate::elastic::signal::Signal;
+
+/// A signal: a number, a pair of arrays (times, values), or a callable.
+#[derive(FromPyObject)]
+enum SignalInput<'py> {
+    Constant(f64),
+    Table(PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>),
+    Function(Py<PyAny>),
+}
+
+impl SignalInput<'_> {
+    fn signal(self) -> Signal {
+        match self {
+            Self::Constant(value) => Signal::Constant(value),
+            Self::Table(times, samples) => Signal::Table { times: values(&times), values: values(&samples) },
+            Self::Function(function) => Signal::Function(Arc::new(move |time| {
+                Python::attach(|py| function.call1(py, (time,))?.extract::<f64>(py))
+                    .map_err(|error| Box::new(error) as crate::elastic::signal::SignalError)
+            })),
+        }
+    }
+}
+
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct MotorInput<'py> {
+    hinge: usize,
+    shaft_second: bool,
+    by_torque: bool,
+    signal: SignalInput<'py>,
+}
+
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct HeadInput {
+    node: usize,
+    neighbours: [usize; 2],
+    translation: f64,
+    rotation: f64,
+    mass: f64,
+}
+
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct ClampInput<'py> {
+    nodes: Vec<usize>,
+    edges: Vec<usize>,
+    angular_velocity: SignalInput<'py>,
+    velocity: [f64; 3],
+}
+
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct FluidInput<'py> {
+    viscosity: f64,
+    immersed: Vec<bool>,
+    twist_drag: bool,
+    density: f64,
+    epsilon: Option<PyReadonlyArray1<'py, f64>>,
+    coefficients: Option<PyReadonlyArray2<'py, f64>>,
+}
+
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct ContactInput {
+    tolerance: f64,
+    max_iterations: usize,
+    exclusion: f64,
+    colliding: Vec<bool>,
+}
+
+/// The mapping that describes a scene.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct SceneInput<'py> {
+    nodes: PyReadonlyArray2<'py, f64>,
+    rest_nodes: PyReadonlyArray2<'py, f64>,
+    edges: PyReadonlyArray2<'py, i64>,
+    hinges: PyReadonlyArray2<'py, i64>,
+    theta: PyReadonlyArray1<'py, f64>,
+    directors: Vec<(usize, [f64; 3])>,
+    radius: PyReadonlyArray1<'py, f64>,
+    density: PyReadonlyArray1<'py, f64>,
+    stretching: PyReadonlyArray1<'py, f64>,
+    bending: PyReadonlyArray3<'py, f64>,
+    twisting: PyReadonlyArray1<'py, f64>,
+    natural_curvature: PyReadonlyArray2<'py, f64>,
+    natural_twist: PyReadonlyArray1<'py, f64>,
+    motors: Vec<MotorInput<'py>>,
+    head: Option<HeadInput>,
+    clamps: Vec<ClampInput<'py>>,
+    loads: Vec<(usize, [f64; 3])>,
+    gravity: [f64; 3],
+    fluid: Option<FluidInput<'py>>,
+    contact: Option<ContactInput>,
+}
+
+impl SceneInput<'_> {
+    /// The specification of this scene; NaN in natural curvature and twist stands for the rest shape's.
+    pub fn specification(self, py: Python<'_>) -> PyResult<Specification> {
+        let nodes = points(py, "nodes", &self.nodes)?;
+        let edges = pairs(py, "edges", &self.edges, nodes.len())?;
+        let hinges = pairs(py, "hinges", &self.hinges, edges.len())?;
+        let stiffness = self.bending.as_array();
+        let curvature = self.natural_curvature.as_array();
+        Ok(Specification {
+            rest_nodes: points(py, "rest_nodes", &self.rest_nodes)?,
+            theta: values(&self.theta),
+            directors: self.directors.into_iter().map(|(edge, d)| (edge, Vec3::from(d))).collect(),
+            radius: values(&self.radius),
+            density: values(&self.density),
+            stretching: values(&self.stretching),
+            bending: stiffness.outer_iter().map(|ei| [[ei[[0, 0]], ei[[0, 1]]], [ei[[1, 0]], ei[[1, 1]]]]).collect(),
+            twisting: values(&self.twisting),
+            natural_curvature: curvature.rows().into_iter().map(|k| (!k[0].is_nan()).then_some([k[0], k[1]])).collect(),
+            natural_twist: values(&self.natural_twist).into_iter().map(|t| (!t.is_nan()).then_some(t)).collect(),
+            motors: self
+                .motors
+                .into_iter()
+                .map(|motor| MotorSpecification {
+                    hinge: motor.hinge,
+                    shaft_second: motor.shaft_second,
+                    by_torque: motor.by_torque,
+                    signal: motor.signal.signal(),
+                })
+                .collect(),
+            head: self.head.map(|head| HeadSpecification {
+                node: head.node,
+                neighbours: head.neighbours,
+                translation: head.translation,
+                rotation: head.rotation,
+                mass: head.mass,
+            }),
+            clamps: self
+                .clamps
+                .into_iter()
+                .map(|clamp| ClampSpecification {
+                    nodes: clamp.nodes,
+                    edges: clamp.edges,
+                    angular_velocity: clamp.angular_velocity.signal(),
+                    velocity: Vec3::from(clamp.velocity),
+                })
+                .collect(),
+            loads: self.loads.into_iter().map(|(node, force)| (node, Vec3::from(force))).collect(),
+            gravity: Vec3::from(self.gravity),
+            fluid: self.fluid.map(fluid),
+            contact: self.contact.map(|contact| ContactSpecification {
+                tolerance: contact.tolerance,
+                max_iterations: contact.max_iterations,
+                exclusion: contact.exclusion,
+                colliding: contact.colliding,
+            }),
+            nodes,
+            edges,
+            hinges,
+        })
+    }
+}
+
+fn fluid(input: FluidInput<'_>) -> FluidSpecification {
+    let coefficients = input
+        .coefficients
+        .as_ref()
+        .map(|array| array.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect());
+    let epsilon = input.epsilon.as_ref().map(values).unwrap_or_default();
+    FluidSpecification {
+        viscosity: input.viscosity,
+        model: match coefficients {
+            Some(coefficients) => FluidModelSpecification::ResistiveForce { coefficients },
+            None => FluidModelSpecification::StokesletSegments { epsilon },
+        },
+        immersed: input.immersed,
+        twist_drag: input.twist_drag,
+        density: input.density,
+    }
+}

@@ -1,0 +1,256 @@
+//! Everything about a trial state that several terms need, computed once per evaluation and without allocation.
+
+use super::frames::{Holonomy, orthonormalised, reference_twist, transport_through};
+use super::network::Network;
+use super::strain::{EdgeFrame, HingeStrain};
+use crate::Vec3;
+
+/// Frames of the last accepted state, from which trial states are transported in time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceFrames {
+    /// Unit tangent of every edge.
+    pub tangents: Vec<Vec3>,
+    /// First reference director of every edge.
+    pub directors: Vec<Vec3>,
+    /// Reference twist of every hinge, continued through whole turns, rad.
+    pub twists: Vec<f64>,
+}
+
+impl ReferenceFrames {
+    /// Frames of a shape: on every connected part the first edge's director is transported in space along the hinges.
+    ///
+    /// `first` gives that director (its part normal to the edge counts). Without it the director is the curvature binormal
+    /// at the first bent hinge met, transported back, so that a rotated scene has rotated frames; a straight part takes any
+    /// perpendicular.
+    pub fn of_shape(network: &Network, nodes: &[Vec3], first: &dyn Fn(usize) -> Option<Vec3>) -> Self {
+        let tangents: Vec<Vec3> = network.edges().iter().map(|&[i, j]| (nodes[j] - nodes[i]).normalize()).collect();
+        let mut meeting = vec![Vec::new(); tangents.len()];
+        for hinge in network.hinges() {
+            let [e, f] = hinge.edges;
+            let sign = hinge.signs[0] * hinge.signs[1];
+            meeting[e].push((f, sign));
+            meeting[f].push((e, sign));
+        }
+        let mut directors: Vec<Option<Vec3>> = vec![None; tangents.len()];
+        for root in 0..tangents.len() {
+            if directors[root].is_some() {
+                continue;
+            }
+            let t = tangents[root];
+            let seed = first(root).or_else(|| binormal_seen_from(root, &meeting, &tangents));
+            let seed = seed.map(|d| d - t * d.dot(&t)).filter(|d| d.norm() > 0.0);
+            directors[root] = Some(seed.map_or_else(|| super::frames::any_perpendicular(&t), |d| d.normalize()));
+            let mut queue = std::collections::VecDeque::from([root]);
+            while let Some(edge) = queue.pop_front() {
+                let Some(director) = directors[edge] else {
+                    continue;
+                };
+                for &(other, sign) in &meeting[edge] {
+                    if directors[other].is_none() {
+                        // A reversed edge keeps its first director, and its tangent changes sign.
+                        let moved = transport_through(&director, &(tangents[edge] * sign), &tangents[other]);
+                        directors[other] = Some(orthonormalised(&moved, &tangents[other]));
+                        queue.push_back(other);
+                    }
+                }
+            }
+        }
+        let mut frames = Self {
+            directors: directors.into_iter().flatten().collect(),
+            tangents,
+            twists: vec![0.0; network.hinges().len()],
+        };
+        for (k, hinge) in network.hinges().iter().enumerate() {
+            let [e, f] = hinge.edges;
+            frames.twists[k] = reference_twist(
+                &frames.directors[e],
+                &(frames.tangents[e] * hinge.signs[0]),
+                &frames.directors[f],
+                &(frames.tangents[f] * hinge.signs[1]),
+                0.0,
+            );
+        }
+        frames
+    }
+}
+
+/// Turning angles below this count as straight: the binormal's direction would be round-off.
+const STRAIGHT: f64 = 1e-6;
+
+fn binormal_seen_from(root: usize, meeting: &[Vec<(usize, f64)>], tangents: &[Vec3]) -> Option<Vec3> {
+    let mut seen = vec![false; tangents.len()];
+    let mut queue = std::collections::VecDeque::from([root]);
+    seen[root] = true;
+    while let Some(edge) = queue.pop_front() {
+        for &(other, sign) in &meeting[edge] {
+            let binormal = (tangents[edge] * sign).cross(&tangents[other]);
+            if binormal.norm() > STRAIGHT {
+                return Some(transport_through(&binormal.normalize(), &tangents[edge], &tangents[root]));
+            }
+            if !seen[other] {
+                seen[other] = true;
+                queue.push_back(other);
+            }
+        }
+    }
+    None
+}
+
+/// The angle by which a motor has turned the shaft edge of a hinge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShaftAngle {
+    /// Index of the hinge.
+    pub hinge: usize,
+    /// Whether the shaft is the hinge's second edge.
+    pub second: bool,
+    /// Angle of the shaft against its housing about the hinge's direction, rad.
+    pub angle: f64,
+}
+
+/// Edge frames and hinge strains of a trial state.
+#[derive(Debug, Clone)]
+pub struct Configuration {
+    vectors: Vec<Vec3>,
+    lengths: Vec<f64>,
+    tangents: Vec<Vec3>,
+    directors: Vec<Vec3>,
+    material: Vec<[Vec3; 2]>,
+    holonomies: Vec<Holonomy>,
+    twists: Vec<f64>,
+    strains: Vec<HingeStrain>,
+    q: Vec<f64>,
+}
+
+impl Configuration {
+    /// Room for the states of a network with `dof_count` degrees of freedom in all.
+    pub fn new(network: &Network, dof_count: usize) -> Self {
+        let (edges, hinges) = (network.edges().len(), network.hinges().len());
+        let zero = Vec3::zeros();
+        let frame = EdgeFrame { t: Vec3::x(), m1: Vec3::y(), m2: Vec3::z(), length: 1.0 };
+        Self {
+            vectors: vec![zero; edges],
+            lengths: vec![0.0; edges],
+            tangents: vec![zero; edges],
+            directors: vec![zero; edges],
+            material: vec![[zero; 2]; edges],
+            holonomies: vec![Holonomy::NONE; edges],
+            twists: vec![0.0; hinges],
+            strains: vec![HingeStrain::new(frame, frame, 0.0); hinges],
+            q: vec![0.0; dof_count],
+        }
+    }
+
+    /// Moves to the state `q`, with frames transported from `reference` and shafts turned by their motors.
+    ///
+    /// Returns false, and leaves the configuration unusable, if an edge has no length, a coordinate is not finite, or two
+    /// edges of a hinge have folded onto each other.
+    pub fn update(&mut self, network: &Network, q: &[f64], reference: &ReferenceFrames, shafts: &[ShaftAngle]) -> bool {
+        self.q.copy_from_slice(q);
+        for (k, &[i, j]) in network.edges().iter().enumerate() {
+            let vector = node(q, network.node_dofs()[j]) - node(q, network.node_dofs()[i]);
+            let length = vector.norm();
+            if !(length > 0.0 && length.is_finite()) {
+                return false;
+            }
+            let t = vector / length;
+            let old = &reference.tangents[k];
+            // An edge that has not turned keeps its director to the last bit.
+            let director = if *old == t {
+                reference.directors[k]
+            } else {
+                orthonormalised(&transport_through(&reference.directors[k], old, &t), &t)
+            };
+            let second = t.cross(&director);
+            let (sine, cosine) = q[network.edge_dofs()[k]].sin_cos();
+            self.vectors[k] = vector;
+            self.lengths[k] = length;
+            self.tangents[k] = t;
+            self.directors[k] = director;
+            self.material[k] = [director * cosine + second * sine, second * cosine - director * sine];
+            self.holonomies[k] =
+                if *old == t || 1.0 + old.dot(&t) < 1e-4 { Holonomy::NONE } else { Holonomy::new(old, &t, length) };
+        }
+        for (k, hinge) in network.hinges().iter().enumerate() {
+            let [e, f] = hinge.edges;
+            let [se, sf] = hinge.signs;
+            let frame_e = self.frame(e, se);
+            let frame_f = self.frame(f, sf);
+            if 1.0 + frame_e.t.dot(&frame_f.t) < 1e-10 {
+                return false;
+            }
+            self.twists[k] =
+                reference_twist(&self.directors[e], &frame_e.t, &self.directors[f], &frame_f.t, reference.twists[k]);
+            let theta = |edge: usize, sign: f64| sign * q[network.edge_dofs()[edge]];
+            let tau = theta(f, sf) - theta(e, se) + self.twists[k];
+            self.strains[k] = HingeStrain::new(frame_e, frame_f, tau);
+        }
+        for shaft in shafts {
+            let HingeStrain { mut e, mut f, tau, .. } = self.strains[shaft.hinge];
+            if shaft.second {
+                f = turned(&f, -shaft.angle);
+            } else {
+                e = turned(&e, shaft.angle);
+            }
+            self.strains[shaft.hinge] = HingeStrain::new(e, f, tau - shaft.angle);
+        }
+        true
+    }
+
+    fn frame(&self, edge: usize, sign: f64) -> EdgeFrame {
+        let [m1, m2] = self.material[edge];
+        EdgeFrame { t: self.tangents[edge] * sign, m1, m2: m2 * sign, length: self.lengths[edge] }
+    }
+
+    /// Degrees of freedom of the state.
+    pub fn q(&self) -> &[f64] {
+        &self.q
+    }
+
+    /// Edge vector, m.
+    pub fn vector(&self, edge: usize) -> Vec3 {
+        self.vectors[edge]
+    }
+
+    /// Edge length, m.
+    pub fn length(&self, edge: usize) -> f64 {
+        self.lengths[edge]
+    }
+
+    /// Unit tangent.
+    pub fn tangent(&self, edge: usize) -> Vec3 {
+        self.tangents[edge]
+    }
+
+    /// Material directors `m1, m2`.
+    pub fn material(&self, edge: usize) -> [Vec3; 2] {
+        self.material[edge]
+    }
+
+    /// Spin of the reference frame of an edge.
+    pub fn holonomy(&self, edge: usize) -> Holonomy {
+        self.holonomies[edge]
+    }
+
+    /// Strains of a hinge.
+    pub fn strain(&self, hinge: usize) -> &HingeStrain {
+        &self.strains[hinge]
+    }
+
+    /// Makes this configuration the reference of the next step.
+    pub fn accept(&self, reference: &mut ReferenceFrames) {
+        reference.tangents.copy_from_slice(&self.tangents);
+        reference.directors.copy_from_slice(&self.directors);
+        reference.twists.copy_from_slice(&self.twists);
+    }
+}
+
+fn turned(frame: &EdgeFrame, angle: f64) -> EdgeFrame {
+    let (sine, cosine) = angle.sin_cos();
+    EdgeFrame { m1: frame.m1 * cosine + frame.m2 * sine, m2: frame.m2 * cosine - frame.m1 * sine, ..*frame }
+}
+
+/// Reads three consecutive coordinates.
+#[inline]
+pub fn node(q: &[f64], dof: usize) -> Vec3 {
+    Vec3::new(q[dof], q[dof + 1], q[dof + 2])
+}

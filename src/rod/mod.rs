@@ -1,0 +1,13 @@
+//! Rods as networks of nodes, edges and hinges: numbering, frames, strains and their derivatives.
+//!
+//! * [`network`]: topology and the numbering of the degrees of freedom.
+//! * [`frames`]: parallel transport in space and time, reference twist, holonomy.
+//! * [`strain`]: curvature and twist of one hinge with exact first and second derivatives.
+//! * [`configuration`]: everything about a trial state that several terms need, computed once.
+//! * [`assembly`]: how a term hands its gradient and Hessian blocks to the solver.
+
+pub mod assembly;
+pub mod configuration;
+pub mod frames;
+pub mod network;
+pub mod strain;

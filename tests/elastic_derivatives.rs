@@ -1,0 +1,134 @@
+//! Gradient and Hessian of the elastic energy against central differences, at and away from the reference frames.
+
+mod common;
+
+use common::{Random, scene};
+use flagrs::Vec3;
+use flagrs::dynamics::scheme::Scheme;
+use flagrs::dynamics::simulation::Simulation;
+use flagrs::dynamics::specification::{MotorSpecification, Specification};
+use flagrs::elastic::signal::Signal;
+
+/// A chain with two motors, a section that is not round, natural curvature and twist, and two branches, one of whose
+/// edges runs against its hinges.
+fn branching_network(random: &mut Random) -> Specification {
+    let mut nodes: Vec<Vec3> = (0..7).map(|k| Vec3::new(k as f64, 0.0, 0.0) + random.vector(0.3)).collect();
+    nodes.push(nodes[3] + Vec3::new(0.3, 1.0, 0.2));
+    nodes.push(nodes[7] + Vec3::new(0.1, 0.9, -0.4));
+    nodes.push(nodes[3] + Vec3::new(-0.2, -0.3, 1.1));
+    let edges = vec![[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 6], [7, 3], [7, 8], [3, 9]];
+    let hinges = vec![[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [2, 6], [6, 3], [6, 7], [8, 2], [8, 6]];
+    let mut specification = scene(nodes, edges, hinges);
+    specification.rest_nodes.iter_mut().for_each(|node| *node += random.vector(0.1));
+    specification.theta.iter_mut().for_each(|theta| *theta = random.uniform());
+    specification.bending.iter_mut().for_each(|ei| *ei = [[2.0, 0.4], [0.4, 1.1]]);
+    specification.natural_curvature[3] = Some([0.2, -0.5]);
+    specification.natural_twist[4] = Some(0.7);
+    specification
+}
+
+fn motor(hinge: usize, shaft_second: bool, by_torque: bool) -> MotorSpecification {
+    MotorSpecification { hinge, shaft_second, by_torque, signal: Signal::Constant(1.0) }
+}
+
+/// Central differences, extrapolated once: error of order h^4.
+fn difference(
+    sim: &mut Simulation,
+    q: &[f64],
+    dof: usize,
+    h: f64,
+    value: &mut dyn FnMut(&mut Simulation) -> Vec<f64>,
+) -> Vec<f64> {
+    let mut at = |shift: f64, sim: &mut Simulation| {
+        let mut moved = q.to_vec();
+        moved[dof] += shift;
+        let mut state = sim.state().clone();
+        state.q = moved;
+        sim.restore(state);
+        value(sim)
+    };
+    let wide: Vec<f64> = at(h, sim).iter().zip(at(-h, sim)).map(|(a, b)| (a - b) / (2.0 * h)).collect();
+    let narrow: Vec<f64> = at(0.5 * h, sim).iter().zip(at(-0.5 * h, sim)).map(|(a, b)| (a - b) / h).collect();
+    let mut state = sim.state().clone();
+    state.q = q.to_vec();
+    sim.restore(state);
+    narrow.iter().zip(&wide).map(|(n, w)| (4.0 * n - w) / 3.0).collect()
+}
+
+fn dense(sim: &Simulation, values: &[f64]) -> Vec<Vec<f64>> {
+    let pattern = sim.model().pattern();
+    let n = pattern.size();
+    let mut out = vec![vec![0.0; n]; n];
+    for column in 0..n {
+        for k in pattern.column_starts()[column]..pattern.column_starts()[column + 1] {
+            out[column][pattern.row_indices()[k]] = values[k];
+        }
+    }
+    out
+}
+
+fn check(specification: Specification, random: &mut Random, displacement: f64, motor_turns: f64) {
+    let mut sim = Simulation::new(specification, Scheme::Overdamped, 1e-2, 1).unwrap();
+    let mut state = sim.state().clone();
+    state.motor_angles.iter_mut().for_each(|angle| *angle = motor_turns * std::f64::consts::TAU + 0.4);
+    for value in &mut state.q {
+        *value += displacement * random.uniform();
+    }
+    // A free motor angle takes part in q; wind it up together with its shaft.
+    let first_free = sim.model().network().dof_count();
+    for dof in first_free..sim.model().dof_count() {
+        state.q[dof] += motor_turns * std::f64::consts::TAU;
+    }
+    for motor in [0usize, 4] {
+        let dof = sim.model().network().edge_dofs()[motor];
+        state.q[dof] += if motor == 0 { -1.0 } else { 1.0 } * motor_turns * std::f64::consts::TAU;
+    }
+    let q = state.q.clone();
+    sim.restore(state);
+    let (gradient, hessian) = sim.elastic_derivatives();
+    let hessian = dense(&sim, &hessian);
+    let scale = gradient.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+    let hessian_scale = hessian.iter().flatten().fold(0.0_f64, |m, g| m.max(g.abs()));
+    for dof in 0..q.len() {
+        let energy = difference(&mut sim, &q, dof, 2e-3, &mut |sim| vec![sim.energies().iter().sum()]);
+        let error = (energy[0] - gradient[dof]).abs() / scale;
+        assert!(error < 1e-8, "gradient of dof {dof}: {} against {}, relative {error:.1e}", gradient[dof], energy[0]);
+        let column = difference(&mut sim, &q, dof, 1e-3, &mut |sim| sim.elastic_derivatives().0);
+        for (row, value) in column.iter().enumerate() {
+            let error = (value - hessian[dof][row]).abs() / hessian_scale;
+            assert!(
+                error < 1e-8,
+                "Hessian ({row}, {dof}): {} against {value}, relative {error:.1e}",
+                hessian[dof][row]
+            );
+        }
+    }
+}
+
+#[test]
+fn derivatives_agree_with_differences_at_the_reference_frames() {
+    let mut random = Random::new(1);
+    for _ in 0..3 {
+        let specification = branching_network(&mut random);
+        check(specification, &mut random, 0.0, 0.0);
+    }
+}
+
+#[test]
+fn derivatives_agree_with_differences_away_from_the_reference_frames() {
+    let mut random = Random::new(2);
+    for _ in 0..3 {
+        let specification = branching_network(&mut random);
+        check(specification, &mut random, 0.25, 0.0);
+    }
+}
+
+#[test]
+fn derivatives_agree_with_differences_with_motors_turned_a_thousand_times() {
+    let mut random = Random::new(3);
+    for by_torque in [false, true] {
+        let mut specification = branching_network(&mut random);
+        specification.motors = vec![motor(0, false, by_torque), motor(3, true, by_torque)];
+        check(specification, &mut random, 0.2, 1000.0);
+    }
+}
