@@ -25,6 +25,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
+    rich_markup_mode=None,  # it takes units in brackets for markup
 )
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
@@ -38,7 +39,7 @@ def list_scenarios() -> None:
     for name, summary in scenarios.list().items():
         options = ", ".join(f"{key}={value!r}" for key, value in scenarios.parameters(name).items())
         table.add_row(name, summary, options)
-    Console().print(table)
+    Console(markup=False).print(table)
 
 
 @app.command()
@@ -193,7 +194,7 @@ def _print_rows(rows: Sequence[dict[str, Any]]) -> None:
             "" if head is None else f"{head / rpm(1.0):.4f}",
             f"{row['wall_seconds']:.1f}",
         )
-    Console().print(table)
+    Console(markup=False).print(table)
 
 
 def main() -> None:

@@ -6,6 +6,7 @@
 //! * [`terms`]: inertia and loads, the terms that belong to no other room.
 //! * [`balance`]: the force balance of one step: residual, derivative, linear solve.
 //! * [`newton`]: Newton's method with line search on that balance.
+//! * [`predictor`]: the guess that method starts from.
 //! * [`scheme`]: which terms a time-stepping scheme keeps and how it treats the fluid.
 //! * [`simulation`]: steps, retries, acceptance.
 //! * [`diagnostics`]: motor torques, force densities, gaps.
@@ -15,6 +16,7 @@ pub mod balance;
 pub mod diagnostics;
 pub mod model;
 pub mod newton;
+pub mod predictor;
 pub mod scheme;
 pub mod simulation;
 pub mod specification;

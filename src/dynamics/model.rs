@@ -1,5 +1,6 @@
 //! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
 
+use super::predictor::History;
 use super::specification::{FluidModelSpecification, Specification};
 use super::state::State;
 use super::terms::{Inertia, Loads};
@@ -343,6 +344,7 @@ fn initial_state(specification: &Specification, network: &Network, dof_count: us
         steps: 0,
         q: coordinates(network, &specification.nodes, &specification.theta, dof_count),
         velocity: vec![0.0; dof_count],
+        history: History::default(),
         frames: shape_frames(specification, network, &specification.nodes),
         motor_angles: vec![0.0; specification.motors.len()],
         contacts: Vec::new(),

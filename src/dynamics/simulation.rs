@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::balance::{Balance, Step};
 use super::model::{Model, ModelError};
 use super::newton::{self, NewtonSettings, NewtonWork};
+use super::predictor::History;
 use super::scheme::Scheme;
 use super::specification::Specification;
 use super::state::State;
@@ -84,6 +85,7 @@ pub struct Simulation {
     statistics: Statistics,
     fluid_step: Option<u64>,
     q: Vec<f64>,
+    extrapolated: Vec<f64>,
     positions: Vec<Vec3>,
     stiffness: Vec<f64>,
 }
@@ -101,6 +103,7 @@ impl Simulation {
         Ok(Self {
             work: NewtonWork::new(model.dof_count),
             q: state.q.clone(),
+            extrapolated: state.q.clone(),
             positions: state.positions(&model.network),
             stiffness: Vec::new(),
             settings: NewtonSettings::default(),
@@ -171,6 +174,7 @@ impl Simulation {
             state.q[dof] = angle;
         }
         state.velocity.fill(0.0);
+        state.history = History::default();
         rebase(&mut state.frames, network.edges(), nodes);
         if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
             return Err(ModelError::Shape { shape: "nodes" });
@@ -205,6 +209,10 @@ impl Simulation {
                 Err(TryError::Signal(error)) => break Err(StepError::Signal(error)),
                 Err(TryError::Solve { residual, iterations, worst, reason }) => {
                     self.statistics.rejected_steps += 1;
+                    // A bad guess is cured by a worse but safer one before the step is made smaller.
+                    if std::mem::take(&mut self.state.history.order) > 0 {
+                        continue;
+                    }
                     part = 0.5 * dt;
                     if part < smallest {
                         break Err(self.convergence_error(dt, residual, iterations, worst, reason));
@@ -250,9 +258,7 @@ impl Simulation {
                 Drive::Torque { signal, .. } => torques[k] = signal.value(t1)?,
             }
         }
-        for (k, (&q, &rate)) in self.state.q.iter().zip(&self.state.velocity).enumerate() {
-            target[k] = q + (t1 - t0) * rate;
-        }
+        self.state.history.predict(t0, &self.state.q, t1, target);
         for clamp in &self.model.clamps {
             for &dof in &clamp.nodes {
                 (0..3).for_each(|c| target[dof + c] = self.state.q[dof + c] + (t1 - t0) * clamp.velocity[c]);
@@ -279,7 +285,6 @@ impl Simulation {
         }
         let step = Step { scheme: *scheme, state, dt, motor_angles: angles, motor_torques: torques };
         balance.begin(&step)?;
-        choose_guess(balance, model, &step, q, statistics);
         let failed = |failure: newton::NewtonFailure| TryError::Solve {
             residual: failure.residual,
             iterations: failure.iterations,
@@ -325,6 +330,8 @@ impl Simulation {
         for ((velocity, new), old) in state.velocity.iter_mut().zip(&self.q).zip(&state.q) {
             *velocity = (new - old) / dt;
         }
+        let work = &mut self.extrapolated;
+        state.history.accept(state.time, &state.q, state.time + dt, &self.q, &self.model.force_weight, work);
         std::mem::swap(&mut state.q, &mut self.q);
         self.balance.configuration().accept(&mut state.frames);
         state.time += dt;
@@ -337,28 +344,6 @@ impl Simulation {
             state.contacts.extend_from_slice(contact.forces());
         }
         self.statistics.steps += 1;
-    }
-}
-
-/// The extrapolated state is a good guess once the motion is steady and a bad one after a jump: take the better.
-fn choose_guess(balance: &mut Balance, model: &Model, step: &Step, q: &mut [f64], statistics: &mut Statistics) {
-    if step.state.velocity.iter().all(|&rate| rate == 0.0) {
-        return;
-    }
-    let ahead = balance.evaluate(model, step, q, statistics);
-    let standing: Vec<f64> = q
-        .iter()
-        .zip(&step.state.q)
-        .zip(&model.prescribed)
-        .map(|((&moved, &old), &prescribed)| if prescribed { moved } else { old })
-        .collect();
-    let standing_size = balance.evaluate(model, step, &standing, statistics);
-    let better = match (ahead, standing_size) {
-        (Some(ahead), Some(standing)) => standing.merit < ahead.merit,
-        (ahead, _) => ahead.is_none(),
-    };
-    if better {
-        q.copy_from_slice(&standing);
     }
 }
 

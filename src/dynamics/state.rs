@@ -1,5 +1,6 @@
 //! The changing part of a simulation: plain data, copied and restored to the last bit.
 
+use super::predictor::History;
 use crate::Vec3;
 use crate::rod::configuration::{ReferenceFrames, node};
 use crate::rod::network::Network;
@@ -15,6 +16,8 @@ pub struct State {
     pub q: Vec<f64>,
     /// Their rates over the last step.
     pub velocity: Vec<f64>,
+    /// States before this one, for the next guess.
+    pub history: History,
     /// Reference frames of this state.
     pub frames: ReferenceFrames,
     /// Angle of every motor, rad.

@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
+use crate::dynamics::predictor::History;
 use crate::dynamics::scheme::Scheme;
 use crate::dynamics::simulation as core;
 use crate::dynamics::state::State;
@@ -246,6 +247,9 @@ impl Simulation {
         out.set_item("steps", PyArray1::from_slice(py, &[state.steps]))?;
         out.set_item("q", PyArray1::from_slice(py, &state.q))?;
         out.set_item("velocity", PyArray1::from_slice(py, &state.velocity))?;
+        out.set_item("history_times", PyArray1::from_slice(py, &state.history.times))?;
+        out.set_item("history_states", from_flat(py, state.history.states.concat(), state.q.len())?)?;
+        out.set_item("history_order", PyArray1::from_slice(py, &[state.history.order as u64]))?;
         out.set_item("tangents", from_points(py, &state.frames.tangents)?)?;
         out.set_item("directors", from_points(py, &state.frames.directors)?)?;
         out.set_item("twists", PyArray1::from_slice(py, &state.frames.twists))?;
@@ -263,6 +267,11 @@ impl Simulation {
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
             q: values(&saved.q),
             velocity: values(&saved.velocity),
+            history: History {
+                times: values(&saved.history_times),
+                states: saved.history_states.as_array().rows().into_iter().map(|row| row.to_vec()).collect(),
+                order: saved.history_order.as_array().first().copied().unwrap_or(0) as usize,
+            },
             frames: ReferenceFrames {
                 tangents: points(py, "tangents", &saved.tangents)?,
                 directors: points(py, "directors", &saved.directors)?,
@@ -276,7 +285,9 @@ impl Simulation {
             && state.frames.tangents.len() == current.frames.tangents.len()
             && state.frames.directors.len() == current.frames.directors.len()
             && state.frames.twists.len() == current.frames.twists.len()
-            && state.motor_angles.len() == current.motor_angles.len();
+            && state.motor_angles.len() == current.motor_angles.len()
+            && state.history.times.len() == state.history.states.len()
+            && state.history.states.iter().all(|past| past.len() == current.q.len());
         let finite = state.time.is_finite() && state.q.iter().chain(&state.velocity).all(|value| value.is_finite());
         if !(same && finite) {
             return Err(scene_error(py, "state", "the saved state", "a finite state of the same scene"));
@@ -294,6 +305,9 @@ struct StateInput<'py> {
     steps: PyReadonlyArray1<'py, u64>,
     q: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
+    history_times: PyReadonlyArray1<'py, f64>,
+    history_states: PyReadonlyArray2<'py, f64>,
+    history_order: PyReadonlyArray1<'py, u64>,
     tangents: PyReadonlyArray2<'py, f64>,
     directors: PyReadonlyArray2<'py, f64>,
     twists: PyReadonlyArray1<'py, f64>,

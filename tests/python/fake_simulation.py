@@ -17,8 +17,6 @@ SPEED = 2e-3
 RATE = -0.5
 TORQUE = 3e-3
 MOTOR_SPEED = 2.0
-#: Sideways circling of the whole body, as of a real swimmer; its speed averages out over whole turns.
-WOBBLE = 1e-4
 
 
 def rigid_frame(scene: Scene, time: float) -> dict[str, Any]:

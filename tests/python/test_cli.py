@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from fake_simulation import SPEED, FakeSimulation
-from flagrs import SceneError, cli, runs, scenarios
+from flagrs import SceneError, cli, runs, scenarios, study
 from flagrs.scene import Fluid
 from flagrs.trajectory import Trajectory
 
@@ -133,6 +133,28 @@ def test_scenarios_are_listed_with_their_parameters(
     assert flagrs(monkeypatch, "scenarios") == 0
     said = capsys.readouterr().out
     assert "clamped_flagella" in said and "rpm=20.0" in said
+
+
+def test_a_study_prints_its_table_with_units_and_reports_failures(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    row = {"normalized_pitch": 7.0, "nodes": 59, "rpm": 20.0, "swimming_speed": 1e-3, "head_rate": -1.0}
+    good = {**row, "wall_seconds": 3.0, "file": "good.h5", "error": None}
+    bad = {**good, "swimming_speed": None, "head_rate": None, "file": "bad.h5", "error": "no"}
+    for rows, code in (([good], 0), ([good, bad], 1)):
+        done = study.Study(rows, Path("table.csv"), Path("figure.png"), 4.0)
+        monkeypatch.setattr(study, "convergence", lambda *_, done=done, **__: done)
+        assert flagrs(monkeypatch, "study", "convergence") == code
+        said = capsys.readouterr()
+        assert "speed [mm/s]" in said.out and "1.0000" in said.out and "table.csv" in said.out
+        assert ("bad.h5: no" in said.err) == bool(code)
+
+
+def test_the_help_keeps_units_in_brackets(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert flagrs(monkeypatch, "run", "--help") == 0
+    assert "Time step [s]." in capsys.readouterr().out
 
 
 def test_the_package_runs_as_a_module() -> None:
