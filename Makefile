@@ -1,0 +1,115 @@
+# The commands of the project. Everything they need beyond Rust and Python >= 3.11 goes into .venv.
+
+# The first Python on the path that is new enough; `make PYTHON=... demo` takes another.
+PYTHON ?= $(shell for python in python3 python3.14 python3.13 python3.12 python3.11 python; do \
+	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$python; break; }; done)
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+
+# What the installed package is built from; Python files are used in place.
+SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find src -name '*.rs')
+
+.PHONY: help demo test test-rust test-python test-wheel figure wheel studies validation bench clean
+.PHONY: lint lint-rust lint-python fmt clippy rustdoc ruff ruff-format mypy stubtest
+
+help:
+	@echo 'make demo        build, run the robot for 100 s of its time, leave robot.h5 and robot.png'
+	@echo 'make test        build, run all tests: Rust, Python, and the examples of the documents'
+	@echo 'make lint        formatting, lints and types of both languages'
+	@echo 'make figure      the picture of the robot in the README'
+	@echo 'make studies     the supplementary text'"'"'s studies: speed against rpm for meshes and geometries'
+	@echo 'make validation  every number and figure of docs/validation'
+	@echo 'make bench       every number of docs/performance.md'
+	@echo 'make wheel       the wheel, in dist/; make test-wheel tries it in an empty environment'
+	@echo 'make clean       remove what these commands have built'
+
+$(BIN)/python:
+	@test -n "$(PYTHON)" || { echo 'error: no Python >= 3.11 on the path' >&2; exit 1; }
+	@cargo --version >/dev/null || { echo 'error: no Rust toolchain on the path; see https://rustup.rs' >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+# The package to use, with figures.
+$(VENV)/installed: $(SOURCES) | $(BIN)/python
+	@echo 'building flagrs into $(VENV): some minutes the first time'
+	$(PIP) install --editable '.[plot]'
+	@touch $@
+
+# The package to work on, with everything tests and checks need.
+$(VENV)/equipped: $(SOURCES) | $(BIN)/python
+	@echo 'building flagrs with its tools into $(VENV): some minutes the first time'
+	$(PIP) install --editable '.[dev]'
+	@touch $@ $(VENV)/installed
+
+demo: $(VENV)/installed
+	$(BIN)/flagrs run robot --until 100 --output robot.h5 --figure robot.png --fresh
+
+test: test-rust test-python
+
+# Doctests are a run of their own: nextest has none.
+test-rust:
+	@if cargo nextest --version >/dev/null 2>&1; then \
+		set -x; cargo nextest run --locked && cargo test --locked --doc; \
+	else \
+		set -x; cargo test --locked; \
+	fi
+
+test-python: $(VENV)/equipped
+	$(BIN)/python -m pytest tests/python
+	$(BIN)/python -m pytest --doctest-modules python/flagrs
+
+lint: lint-rust lint-python
+
+lint-rust: fmt clippy rustdoc
+lint-python: ruff ruff-format mypy stubtest
+
+fmt:
+	cargo fmt --check
+
+clippy:
+	cargo clippy --locked --all-targets --features python -- -D warnings
+
+rustdoc:
+	RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps
+
+ruff: $(VENV)/equipped
+	$(BIN)/ruff check
+
+ruff-format: $(VENV)/equipped
+	$(BIN)/ruff format --check
+
+mypy: $(VENV)/equipped
+	$(BIN)/mypy
+
+stubtest: $(VENV)/equipped
+	$(BIN)/stubtest flagrs._flagrs
+
+figure: $(VENV)/installed
+	$(BIN)/python docs/images/make_robot_figure.py
+
+studies: $(VENV)/installed
+	$(BIN)/flagrs study convergence
+	$(BIN)/flagrs study geometries
+
+validation: $(VENV)/equipped
+	set -e; for script in docs/validation/make_*.py; do $(BIN)/python $$script; done
+
+bench: $(VENV)/equipped
+	cargo bench --locked
+	set -e; for script in kernels steps; do $(BIN)/python benches/python/$$script.py; done
+
+wheel: | $(BIN)/python
+	rm -rf dist
+	$(PIP) wheel --no-deps --wheel-dir dist .
+
+# In an empty environment, and away from the sources.
+test-wheel: wheel
+	rm -rf $(VENV)-wheel
+	$(PYTHON) -m venv $(VENV)-wheel
+	$(VENV)-wheel/bin/python -m pip --disable-pip-version-check --quiet install dist/*abi3*.whl
+	cd / && $(CURDIR)/$(VENV)-wheel/bin/flagrs doctor
+
+clean:
+	cargo clean
+	rm -rf $(VENV) $(VENV)-wheel dist python/flagrs/_flagrs*.so

@@ -1,0 +1,37 @@
+//! Regularized Stokeslet segments: the mobility matrix per pair of target and edge, on one thread and on all.
+
+#[path = "../tests/common/scenes.rs"]
+mod scenes;
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use flagrs::dynamics::threads;
+use flagrs::fluid::stokeslet::mobility;
+
+fn assembly(criterion: &mut Criterion) {
+    let available = threads::thread_count(None);
+    let mut counts = vec![1, available];
+    counts.dedup();
+    let mut group = criterion.benchmark_group("RSS assembly");
+    for nodes in [59, 136, 600] {
+        let scene = scenes::helix(nodes);
+        let epsilon = vec![scenes::ROBOT_EPSILON; scene.edges.len()];
+        let mut out = vec![0.0; 9 * nodes * nodes];
+        group.throughput(Throughput::Elements((nodes * scene.edges.len()) as u64));
+        for &count in &counts {
+            let pool = threads::pool(count);
+            group.bench_function(BenchmarkId::new(format!("{count} threads"), nodes), |bencher| {
+                bencher.iter(|| {
+                    let nodes = black_box(&scene.nodes);
+                    mobility(nodes, nodes, &scene.edges, &epsilon, &mut out, pool.as_deref());
+                    black_box(&mut out);
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(fluid, assembly);
+criterion_main!(fluid);

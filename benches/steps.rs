@@ -1,0 +1,162 @@
+//! Whole steps of the robot and of two clamped flagella in every scheme, and where their time goes.
+
+#[path = "../tests/common/scenes.rs"]
+mod scenes;
+
+use std::time::{Duration, Instant};
+
+use criterion::{BenchmarkId, Criterion, SamplingMode};
+use flagrs::dynamics::scheme::Scheme;
+use flagrs::dynamics::simulation::Simulation;
+use flagrs::dynamics::specification::Specification;
+use flagrs::dynamics::state::State;
+use flagrs::dynamics::statistics::Statistics;
+
+/// Steps from the initial shape, in the default scheme, to the state all schemes start from.
+const APPROACH: usize = 100;
+/// Steps after a change of scheme that are not measured.
+const SETTLING: usize = 50;
+/// Steps between returns to the start, so that every sample measures the same motion.
+const BLOCK: usize = 20;
+/// Blocks of the table by part.
+const BLOCKS: usize = 15;
+
+/// A scheme with its step, s.
+struct Case {
+    scene: &'static str,
+    scheme: Scheme,
+    simulation: Simulation,
+    start: State,
+}
+
+impl Case {
+    fn new(scene: &'static str, specification: &Specification, approached: &State, scheme: Scheme, dt: f64) -> Self {
+        let mut simulation = Simulation::new(specification.clone(), scheme, dt, 1).expect("a valid scene");
+        simulation.restore(approached.clone());
+        make_steps(&mut simulation, SETTLING);
+        let start = simulation.state().clone();
+        Self { scene, scheme, simulation, start }
+    }
+
+    fn label(&self) -> String {
+        format!("{} at {:.3} ms", self.scheme.name(), 1e3 * self.simulation.dt())
+    }
+
+    /// Time of this many steps, in blocks from the start.
+    fn time(&mut self, steps: usize) -> Duration {
+        let mut spent = Duration::ZERO;
+        let mut left = steps;
+        while left > 0 {
+            let block = left.min(BLOCK);
+            self.simulation.restore(self.start.clone());
+            let begun = Instant::now();
+            make_steps(&mut self.simulation, block);
+            spent += begun.elapsed();
+            left -= block;
+        }
+        spent
+    }
+
+    /// What a step of one block takes, by part.
+    fn profile(&mut self) -> Profile {
+        let before = self.simulation.statistics();
+        self.time(BLOCK);
+        Profile::between(&before, &self.simulation.statistics())
+    }
+}
+
+fn make_steps(simulation: &mut Simulation, count: usize) {
+    for _ in 0..count {
+        if let Err(error) = simulation.step() {
+            panic!("{}: {error}", simulation.scheme().name());
+        }
+    }
+}
+
+/// Milliseconds of a step: in all, fluid matrix, residuals and derivatives, linear systems, contact, the rest; then Newton
+/// and Krylov iterations of a step.
+struct Profile([f64; 8]);
+
+impl Profile {
+    fn between(before: &Statistics, after: &Statistics) -> Self {
+        let seconds = |part: fn(&Statistics) -> f64| 1e3 * (part(after) - part(before)) / BLOCK as f64;
+        let count = |part: fn(&Statistics) -> u64| (part(after) - part(before)) as f64 / BLOCK as f64;
+        let total = seconds(|s| s.seconds_total);
+        let parts = [
+            seconds(|s| s.seconds_fluid),
+            seconds(|s| s.seconds_assembly),
+            seconds(|s| s.seconds_linear),
+            seconds(|s| s.seconds_contact),
+        ];
+        let [fluid, assembly, linear, contact] = parts;
+        let rest = total - parts.iter().sum::<f64>();
+        let iterations = [count(|s| s.newton_iterations), count(|s| s.krylov_iterations)];
+        Self([total, fluid, assembly, linear, contact, rest, iterations[0], iterations[1]])
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for (name, specification, dt) in [
+        ("robot", scenes::robot(7.0, 20.0), scenes::robot_step(20.0)),
+        ("two clamped flagella", scenes::clamped_flagella(2), scenes::clamped_step()),
+    ] {
+        let mut approach = Simulation::new(specification.clone(), Scheme::Overdamped, dt, 1).expect("a valid scene");
+        make_steps(&mut approach, APPROACH);
+        let schemes =
+            [(Scheme::Overdamped, dt), (Scheme::Implicit, dt), (Scheme::Explicit, 1e-3), (Scheme::Explicit, 1e-4)];
+        cases.extend(schemes.map(|(scheme, dt)| Case::new(name, &specification, approach.state(), scheme, dt)));
+    }
+    cases
+}
+
+fn whole_steps(criterion: &mut Criterion, cases: &mut [Case]) {
+    for case in cases {
+        let mut group = criterion.benchmark_group("whole step");
+        group.sample_size(20).sampling_mode(SamplingMode::Flat);
+        group.bench_function(BenchmarkId::new(case.scene, case.label()), |bencher| {
+            bencher.iter_custom(|iterations| case.time(iterations as usize));
+        });
+        group.finish();
+    }
+}
+
+/// Prints where a step's time goes: medians over blocks taken in turn, so that a busy moment falls on every case.
+fn print_table(cases: &mut [Case]) {
+    let mut profiles: Vec<Vec<Profile>> = cases.iter().map(|_| Vec::new()).collect();
+    for _ in 0..BLOCKS {
+        for (case, profiles) in cases.iter_mut().zip(&mut profiles) {
+            profiles.push(case.profile());
+        }
+    }
+    println!("Milliseconds of a step on one thread, medians of {BLOCKS} blocks of {BLOCK} steps:\n");
+    println!("| scene | scheme | step | least | fluid matrix | assembly | linear | contact | rest | Newton | Krylov |");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for (case, profiles) in cases.iter().zip(&profiles) {
+        let column = |k: usize| median(profiles.iter().map(|profile| profile.0[k]).collect());
+        let least = profiles.iter().map(|profile| profile.0[0]).fold(f64::INFINITY, f64::min);
+        let parts: Vec<String> = (1..6).map(|k| format!("{:.3}", column(k))).collect();
+        println!(
+            "| {} | {} | {:.3} | {least:.3} | {} | {:.1} | {:.1} |",
+            case.scene,
+            case.label(),
+            column(0),
+            parts.join(" | "),
+            column(6),
+            column(7)
+        );
+    }
+}
+
+fn main() {
+    let mut cases = cases();
+    let mut criterion = Criterion::default().configure_from_args();
+    whole_steps(&mut criterion, &mut cases);
+    criterion.final_summary();
+    print_table(&mut cases);
+}

@@ -1,0 +1,92 @@
+//! The canonical scenes are those of the published runs: node counts, sizes, and that each of them moves.
+
+#[path = "common/scenes.rs"]
+mod scenes;
+
+use flagrs::Vec3;
+use flagrs::dynamics::scheme::Scheme;
+use flagrs::dynamics::simulation::Simulation;
+use flagrs::dynamics::specification::Specification;
+
+fn edge_lengths(scene: &Specification) -> Vec<f64> {
+    scene.edges.iter().map(|&[i, j]| (scene.nodes[j] - scene.nodes[i]).norm()).collect()
+}
+
+#[test]
+fn robots_have_the_published_node_counts() {
+    let counts = [5.0, 7.0, 9.0].map(|pitch| scenes::robot(pitch, 20.0).nodes.len());
+    assert_eq!(counts, [69, 59, 55]);
+}
+
+#[test]
+fn every_clamped_flagellum_has_68_nodes() {
+    for count in [1, 2, 3, 10] {
+        assert_eq!(scenes::clamped_flagella(count).nodes.len(), 68 * count);
+    }
+}
+
+#[test]
+fn flagella_of_the_robot_are_28_mm_apart_and_95_mm_long_beyond_the_axis_points() {
+    let scene = scenes::robot(7.0, 20.0);
+    let head = scene.head.expect("the robot has a head").node;
+    let (axis_1, axis_2) = (scene.nodes[head - 3], scene.nodes[head + 3]);
+    assert_eq!(axis_2 - axis_1, Vec3::new(0.0, 28e-3, 0.0));
+    for tip in [scene.nodes[0], scene.nodes[58]] {
+        assert!((tip.x - axis_1.x - 95.4e-3).abs() < 1e-15, "a tip at x = {}", tip.x);
+    }
+    // The axis point's radial edge is as long as the helix radius, and normal to the axis.
+    for radial in [scene.nodes[head - 4] - axis_1, scene.nodes[head + 4] - axis_2] {
+        assert!((radial - Vec3::new(0.0, 6.36e-3, 0.0)).norm() < 1e-15, "{radial}");
+    }
+}
+
+#[test]
+fn robot_feels_the_fluid_outside_its_head_only() {
+    let scene = scenes::robot(7.0, 20.0);
+    let head = scene.head.expect("the robot has a head").node;
+    let immersed = &scene.fluid.as_ref().expect("the robot is in a fluid").immersed;
+    let dry: Vec<usize> = (0..immersed.len()).filter(|&edge| !immersed[edge]).collect();
+    assert_eq!(dry, (head - 3..head + 3).collect::<Vec<_>>());
+}
+
+#[test]
+fn two_clamped_flagella_stand_30_mm_apart_and_advance_200_mm() {
+    let scene = scenes::clamped_flagella(2);
+    assert!(((scene.nodes[68] - scene.nodes[0]).norm() - 30e-3).abs() < 1e-15);
+    assert!((scene.nodes[67].x - 200e-3).abs() < 1e-15, "the tip is at x = {}", scene.nodes[67].x);
+    // The clamped edge points along +x and is an edge of the helix long.
+    let clamped = scene.nodes[1] - scene.nodes[0];
+    let arc = (200e-3 / 50e-3) * (std::f64::consts::TAU * 10e-3).hypot(50e-3) / 64.0;
+    assert!((clamped - Vec3::new(arc, 0.0, 0.0)).norm() < 1e-15, "{clamped}");
+}
+
+#[test]
+fn helix_of_26_nodes_is_a_flagellum_of_the_robot() {
+    let (helix, robot) = (scenes::helix(26), scenes::robot(7.0, 20.0));
+    let own = edge_lengths(&helix);
+    let flagellum = &edge_lengths(&robot)[34..];
+    assert_eq!(own.len(), flagellum.len());
+    for (a, b) in own.iter().zip(flagellum) {
+        assert!((a - b).abs() < 1e-15, "edges of {a} and {b} m");
+    }
+}
+
+#[test]
+fn scenes_take_steps_in_every_scheme() {
+    let canonical = [
+        ("helix", scenes::helix(20), 1e-3),
+        ("robot", scenes::robot(7.0, 20.0), scenes::robot_step(20.0)),
+        ("clamped flagella", scenes::clamped_flagella(2), scenes::clamped_step()),
+    ];
+    for (name, scene, dt) in canonical {
+        for (scheme, dt) in [(Scheme::Overdamped, dt), (Scheme::Implicit, dt), (Scheme::Explicit, 1e-4)] {
+            let mut simulation = Simulation::new(scene.clone(), scheme, dt, 1).expect("a valid scene");
+            for _ in 0..3 {
+                if let Err(error) = simulation.step() {
+                    panic!("{name}, {}: {error}", scheme.name());
+                }
+            }
+            assert_eq!(simulation.statistics().rejected_steps, 0, "{name}, {}", scheme.name());
+        }
+    }
+}
