@@ -169,10 +169,11 @@ def _fluid(scene: Scene, fluid: Fluid) -> dict[str, Any]:
 def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
     """Return drag per length along and across every edge (E, 2) [N s/m^2].
 
-    Gray and Hancock (1955): ``2 pi mu / (ln(2 lambda/a) - 1/2)`` and ``4 pi mu / (ln(2 lambda/a) + 1/2)`` with the
+    Gray and Hancock (1955): ``2 pi mu / (ln(2 lambda/a) - 1/2)`` and ``4 pi mu / (ln(2 lambda/a) + 1/2)``
+    with the
     wavelength ``lambda``. Lighthill (1976): ``2 pi mu / ln(2 q/a)`` and ``4 pi mu / (ln(2 q/a) + 1/2)`` with
-    ``q = 0.09`` times the arc length of a wavelength. Where the fluid gives no wavelength, the immersed length of
-    the rod stands for it.
+    ``q = 0.09`` times the arc length of a wavelength. Where the fluid gives no wavelength, the immersed
+    length of the rod stands for it.
     """
     rows = []
     for rod in scene.rods:

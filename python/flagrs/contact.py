@@ -24,8 +24,8 @@ def segment_distance(a0: Any, a1: Any, b0: Any, b1: Any) -> tuple[FloatArray, Fl
     Returns
     -------
     distance, s, t : ndarray
-        Distance [m] and the places in [0, 1] of the closest points ``a0 + s (a1 - a0)`` and ``b0 + t (b1 - b0)``; of
-        shape () or (K,).
+        Distance [m] and the places in [0, 1] of the closest points ``a0 + s (a1 - a0)`` and ``b0 + t (b1 -
+        b0)``; of shape () or (K,).
 
     Raises
     ------

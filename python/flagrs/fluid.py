@@ -8,7 +8,8 @@ import numpy as np
 
 from flagrs import _flagrs
 from flagrs.errors import SceneError
-from flagrs.scene.values import FloatArray, IntArray
+from flagrs.scene.shapes import number
+from flagrs.scene.values import Bounds, FloatArray, IntArray
 
 __all__ = ["hat_weights", "mobility", "velocity"]
 
@@ -34,7 +35,8 @@ def mobility(
     Returns
     -------
     ndarray
-        A (3M, 3N) [m]; rows are target components, columns node components. By collocation it is not symmetric.
+        A (3M, 3N) [m]; rows are target components, columns node components. By collocation it is not
+        symmetric.
 
     Raises
     ------
@@ -43,8 +45,8 @@ def mobility(
 
     Notes
     -----
-    Cortez (2018), doi:10.1016/j.jcp.2018.08.055; docs/theory/fluid.md, equations 12 to 14. Each 3x3 block is exact to
-    1e-12.
+    Cortez (2018), doi:10.1016/j.jcp.2018.08.055; docs/theory/fluid.md, equations 12 to 14. Each 3x3 block
+    is exact to 1e-12.
 
     Examples
     --------
@@ -102,17 +104,15 @@ def velocity(
     density = _vectors("force_density", force_density)
     if density.shape != sources.shape:
         raise _wrong("force_density", f"shape {density.shape}", f"of shape {sources.shape}")
-    if not (np.isscalar(viscosity) and 0.0 < viscosity < np.inf):
-        raise _wrong("viscosity", viscosity, "> 0 Pa s")
+    mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
-    return _flagrs.velocity(
-        at, sources, pairs, density, float(viscosity), widths, _flagrs.thread_count(threads)
-    )
+    return _flagrs.velocity(at, sources, pairs, density, mu, widths, _flagrs.thread_count(threads))
 
 
 def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:
-    """Return nodal forces (N, 3) [N] of a nodal force density (N, 3) [N/m]: the integrals of hat functions times it.
+    """Return nodal forces (N, 3) [N] of a nodal force density (N, 3) [N/m].
 
+    They are the integrals of each node's hat function times the density, which is linear along each edge.
     Total force and torque are exact: ``hat_weights(...).sum(axis=0)`` is the integral of the density.
     """
     points, pairs, _ = _segments(nodes, edges, 1.0)

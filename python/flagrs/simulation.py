@@ -37,12 +37,12 @@ class Simulation:
     scene
         What is simulated.
     scheme
-        ``overdamped``: no inertia, fluid and elasticity implicit, first order, the default; ``implicit``: the same
-        with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the last velocities, stable
-        only for small steps (docs/theory/time.md).
+        ``overdamped``: no inertia, fluid and elasticity implicit, first order, the default; ``implicit``:
+        the same with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the
+        last velocities, stable only for small steps (docs/theory/time.md).
     dt
-        Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit for the
-        explicit scheme.
+        Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit
+        for the explicit scheme.
     rtol
         Reserved for adaptive steps; must be None.
     threads
@@ -79,7 +79,7 @@ class Simulation:
             )
         if rtol is not None:
             raise SceneError(
-                f"rtol: {rtol} is not allowed; must be None: the schemes of this release take fixed steps, see dt",
+                f"rtol: {rtol} is not allowed; must be None: this release takes fixed steps, see dt",
                 field="rtol",
                 value=rtol,
                 allowed="None",
@@ -205,7 +205,10 @@ class Simulation:
         """
         if not isinstance(n, int | np.integer) or n < 0:
             raise SceneError(
-                f"n: {n} is not allowed; must be an integer >= 0", field="n", value=n, allowed="an integer >= 0"
+                f"n: {n} is not allowed; must be an integer >= 0",
+                field="n",
+                value=n,
+                allowed="an integer >= 0",
             )
         self._native.step(int(n))
 
@@ -218,8 +221,8 @@ class Simulation:
     ) -> Trajectory:
         """Run until a time and return what was recorded.
 
-        Steps are shortened a little so that a whole number of them makes `save_every`. The file is complete at any moment:
-        a run that is killed can be read, and gone on with by `Simulation.restore`.
+        Steps are shortened a little so that a whole number of them makes `save_every`. The file is
+        complete at any moment: a run that is killed can be read, and gone on with by `Simulation.restore`.
 
         Parameters
         ----------
@@ -297,7 +300,8 @@ class Simulation:
         Raises
         ------
         SceneError
-            For a wrong shape, a value that is not finite, or a shape that is not a configuration; nothing is changed.
+            For a wrong shape, a value that is not finite, or a shape that is not a configuration; nothing
+            is changed.
         """
         self._native.place(_array("nodes", nodes, 2), None if theta is None else _array("theta", theta, 1))
 
@@ -309,13 +313,13 @@ class Simulation:
     def gradient(self) -> FloatArray:
         """Return the gradient (ndof,) of the elastic energy [N, N m].
 
-        The numbering interleaves ``x0 y0 z0 theta0 x1 ...``; see `dof_of_node` and `dof_of_edge`. Angles of torque-driven
-        motors come last.
+        The numbering interleaves ``x0 y0 z0 theta0 x1 ...``; see `dof_of_node` and `dof_of_edge`. Angles
+        of torque-driven motors come last.
         """
         return self._native.gradient()
 
     def hessian(self) -> scipy.sparse.csc_matrix:
-        """Return the Hessian (ndof, ndof) of the elastic energy in the numbering of `gradient` [N/m, N, N m]."""
+        """Return the Hessian (ndof, ndof) of the elastic energy, numbered as `gradient` [N/m, N, N m]."""
         values, rows, starts = self._native.hessian()
         size = self._native.dof_count
         return scipy.sparse.csc_matrix((values, rows, starts), shape=(size, size))
@@ -323,13 +327,13 @@ class Simulation:
     def resistance(self) -> FloatArray:
         """Return the resistance (3N, 3N) of the nodes to the fluid [N s/m], zero for dry nodes.
 
-        ``resistance() @ velocities.ravel()`` is the force that drags the nodes at these velocities; twist drag and head
-        are not in it.
+        ``resistance() @ velocities.ravel()`` is the force that drags the nodes at these velocities; twist
+        drag and head are not in it.
         """
         return self._native.resistance()
 
     def stable_step(self) -> float:
-        """Return the longest stable step of the explicit scheme [s]: 2 over the largest eigenvalue of M^-1 Res."""
+        """Return the longest stable step of the explicit scheme [s]: 2 / lambda_max(M^-1 Res)."""
         rows = (self.dof_of_node[:, None] + np.arange(3)).ravel()
         return explicit_limit(self.resistance(), self.mass[rows])
 
@@ -390,8 +394,8 @@ def _check_scheme(scene: Scene, scheme: str) -> None:
     wet = scene.fluid is not None and scene.fluid.model != "none"
     if not wet or not any(rod.immersed_array().any() for rod in scene.rods):
         raise SceneError(
-            "scheme: overdamped is not allowed without a fluid; must be implicit, or the scene needs a fluid with a "
-            "model that resists motion",
+            "scheme: overdamped is not allowed without a fluid; must be implicit, or the scene needs a "
+            "fluid with a model that resists motion",
             field="scheme",
             value=scheme,
             allowed="implicit or explicit for a scene without drag",

@@ -1,4 +1,4 @@
-"""The examples: every Python block of the documents and every program in examples/ runs, and every reference leads somewhere."""
+"""The documents: their Python blocks and the programs in examples/ run, their links and commands exist."""
 
 from __future__ import annotations
 

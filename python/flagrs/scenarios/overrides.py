@@ -8,8 +8,8 @@ from typing import Any
 from flagrs.errors import SceneError, not_allowed
 from flagrs.scene import Contact, Fluid
 
-FluidOverride = Fluid | Mapping[str, Any] | None
-ContactOverride = bool | Contact | Mapping[str, Any]
+FluidOverride = Fluid | str | Mapping[str, Any] | None
+ContactOverride = bool | Contact | Mapping[str, Any] | None
 
 
 def fluid_from(override: FluidOverride, default: Fluid, twist_drag: bool = True) -> Fluid:
@@ -17,6 +17,8 @@ def fluid_from(override: FluidOverride, default: Fluid, twist_drag: bool = True)
 
     Twist drag is on only where neither the fluid nor the argument switches it off.
     """
+    if isinstance(override, str):
+        override = {"model": override}
     if isinstance(override, Fluid):
         fluid = override
     elif override is None or isinstance(override, Mapping):
@@ -25,7 +27,7 @@ def fluid_from(override: FluidOverride, default: Fluid, twist_drag: bool = True)
         except SceneError as error:
             raise error.within("fluid") from None
     else:
-        raise not_allowed("fluid", override, "a Fluid or a mapping of its options")
+        raise not_allowed("fluid", override, "a Fluid, the name of a model, or a mapping of options")
     return fluid if twist_drag else fluid.replace(twist_drag=False)
 
 
@@ -33,7 +35,7 @@ def contact_from(override: ContactOverride) -> Contact | None:
     """Return no contact, contact as it is by default, with some options changed, or another one."""
     if isinstance(override, Contact):
         return override
-    if isinstance(override, bool):
+    if override is None or isinstance(override, bool):
         return Contact() if override else None
     if isinstance(override, Mapping):
         try:

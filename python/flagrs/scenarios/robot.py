@@ -94,7 +94,8 @@ def robot(
         name="robot",
     )
     speeds = _speeds(rpm)
-    default = Fluid(viscosity=1.0, epsilon=scale * EPSILON)
+    pitch = scale * normalized_pitch * HELIX_RADIUS
+    default = Fluid(viscosity=1.0, epsilon=scale * EPSILON, wavelength=pitch)
     return Scene(
         rods=(rod,),
         fluid=fluid_from(fluid, default, twist_drag),
