@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 # What the installed package is built from; Python files are used in place.
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find src -name '*.rs')
 
-.PHONY: help demo test test-rust test-python test-wheel figure wheel studies validation bench clean
+.PHONY: help demo test test-rust test-rust-doc test-python test-python-doc test-wheel figure wheel studies validation bench clean
 .PHONY: lint lint-rust lint-python fmt clippy rustdoc ruff ruff-format mypy stubtest
 
 help:
@@ -45,18 +45,22 @@ $(VENV)/equipped: $(SOURCES) | $(BIN)/python
 demo: $(VENV)/installed
 	$(BIN)/flagrs run robot --until 100 --output robot.h5 --figure robot.png --fresh
 
-test: test-rust test-python
+test: test-rust test-rust-doc test-python test-python-doc
 
-# Doctests are a run of their own: nextest has none.
 test-rust:
 	@if cargo nextest --version >/dev/null 2>&1; then \
-		set -x; cargo nextest run --locked && cargo test --locked --doc; \
+		set -x; cargo nextest run --locked --no-fail-fast; \
 	else \
-		set -x; cargo test --locked; \
+		set -x; cargo test --locked --no-fail-fast --lib --tests; \
 	fi
+
+test-rust-doc:
+	cargo test --locked --doc
 
 test-python: $(VENV)/equipped
 	$(BIN)/python -m pytest tests/python
+
+test-python-doc: $(VENV)/equipped
 	$(BIN)/python -m pytest --doctest-modules python/flagrs
 
 lint: lint-rust lint-python
@@ -105,11 +109,10 @@ wheel: | $(BIN)/python
 
 # In an empty environment, and away from the sources.
 test-wheel: wheel
-	rm -rf $(VENV)-wheel
-	$(PYTHON) -m venv $(VENV)-wheel
-	$(VENV)-wheel/bin/python -m pip --disable-pip-version-check --quiet install dist/*abi3*.whl
-	cd / && $(CURDIR)/$(VENV)-wheel/bin/flagrs doctor
+	$(PYTHON) -m venv dist/trial
+	dist/trial/bin/python -m pip --disable-pip-version-check --quiet install dist/*abi3*.whl
+	cd / && '$(CURDIR)'/dist/trial/bin/flagrs doctor
 
 clean:
 	cargo clean
-	rm -rf $(VENV) $(VENV)-wheel dist python/flagrs/_flagrs*.so
+	rm -rf $(VENV) dist python/flagrs/_flagrs*.so

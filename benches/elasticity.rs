@@ -45,10 +45,8 @@ impl Chain {
             stiffness: scene.bending[k].map(|row| row.map(|entry| entry / voronoi(k))),
             natural: configuration.strain(k).kappa,
         });
-        let twisting = (0..nodes - 2).map(|k| Twisting {
-            stiffness: scene.twisting[k] / voronoi(k),
-            natural: configuration.strain(k).tau,
-        });
+        let twisting = (0..nodes - 2)
+            .map(|k| Twisting { stiffness: scene.twisting[k] / voronoi(k), natural: configuration.strain(k).tau });
         let elements = (0..nodes - 2).map(|hinge| HingeElement::new(&network, hinge, None)).collect();
         let mut hinges = Hinges::new(elements, bending.collect(), twisting.collect());
         let mut stretching = Stretching::new(&network, scene.stretching.clone(), rest_lengths.clone());
@@ -118,14 +116,15 @@ fn elasticity(criterion: &mut Criterion) {
         let sum = |values: &[f64]| values.iter().map(|value| value.abs()).sum::<f64>();
         assert!((sum(&chain.hessian) / sum(&hessian) - 1.0).abs() < 1e-12, "and its Hessian");
 
+        let size = format!("{nodes} nodes");
         group.throughput(Throughput::Elements(nodes as u64));
-        group.bench_function(BenchmarkId::new("energy", nodes), |bencher| bencher.iter(|| black_box(chain.energy())));
-        group.bench_function(BenchmarkId::new("gradient", nodes), |bencher| bencher.iter(|| chain.derive(false)));
-        group.bench_function(BenchmarkId::new("gradient and Hessian", nodes), |bencher| {
+        group.bench_function(BenchmarkId::new("energy", &size), |bencher| bencher.iter(|| black_box(chain.energy())));
+        group.bench_function(BenchmarkId::new("gradient", &size), |bencher| bencher.iter(|| chain.derive(false)));
+        group.bench_function(BenchmarkId::new("gradient and Hessian", &size), |bencher| {
             bencher.iter(|| chain.derive(true));
         });
         let mut resting = Chain::of(&simulation(nodes, false), nodes);
-        group.bench_function(BenchmarkId::new("gradient and Hessian at the reference frames", nodes), |bencher| {
+        group.bench_function(BenchmarkId::new("gradient and Hessian at the reference frames", &size), |bencher| {
             bencher.iter(|| resting.derive(true));
         });
     }

@@ -21,7 +21,8 @@ fn assembly(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements((nodes * scene.edges.len()) as u64));
         for &count in &counts {
             let pool = threads::pool(count);
-            group.bench_function(BenchmarkId::new(format!("{count} threads"), nodes), |bencher| {
+            let name = if count == 1 { "1 thread".to_owned() } else { format!("{count} threads") };
+            group.bench_function(BenchmarkId::new(name, format!("{nodes} nodes")), |bencher| {
                 bencher.iter(|| {
                     let nodes = black_box(&scene.nodes);
                     mobility(nodes, nodes, &scene.edges, &epsilon, &mut out, pool.as_deref());

@@ -24,7 +24,7 @@ fn dense_lu(criterion: &mut Criterion) {
     for nodes in [59, 136, 600] {
         let matrix = mobility_of_helix(nodes);
         let mut lu = DenseLu::new(3 * nodes);
-        group.bench_function(BenchmarkId::new("factorization", 3 * nodes), |bencher| {
+        group.bench_function(BenchmarkId::new("factorization", format!("{} rows", 3 * nodes)), |bencher| {
             // The factors overwrite the matrix; copying it back is not part of the time.
             bencher.iter_custom(|iterations| {
                 let mut spent = Duration::ZERO;
@@ -39,7 +39,7 @@ fn dense_lu(criterion: &mut Criterion) {
         });
         let load: Vec<f64> = (0..3 * nodes).map(|k| (k as f64).sin()).collect();
         let mut solution = load.clone();
-        group.bench_function(BenchmarkId::new("back-substitution", 3 * nodes), |bencher| {
+        group.bench_function(BenchmarkId::new("back-substitution", format!("{} rows", 3 * nodes)), |bencher| {
             bencher.iter(|| {
                 solution.copy_from_slice(&load);
                 lu.solve(black_box(&mut solution)).expect("a factored matrix solves");

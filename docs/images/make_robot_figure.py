@@ -1,7 +1,7 @@
 """The picture of the swimming robot in the README: what `make figure` runs.
 
-The robot of the supplementary text, pitch 7, swims for 100 s at 20 rpm on a mesh of 2.5 mm; its shape is drawn at four
-instants, flagella as thick as they are, and its speed over time.
+The robot of the supplementary text, pitch 7, swims for 100 s at 20 rpm on a mesh of 2.5 mm. Drawn are its
+shape at four instants, flagella as thick as they are, and its speed and the head's rotation over time.
 """
 
 from __future__ import annotations
@@ -13,15 +13,14 @@ import matplotlib
 
 matplotlib.use("Agg")
 
+import flagrs
+from flagrs.plot.rates import draw_head_rate, draw_speed
+from flagrs.progress import ProgressBar
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-
-import flagrs
-from flagrs.plot.rates import draw_head_rate, draw_speed
-from flagrs.progress import ProgressBar
 
 INSTANTS = (0.0, 5.0, 20.0, 100.0)
 FLAGELLA = ("#0072b2", "#d55e00")
@@ -78,9 +77,13 @@ def draw_shape(axes: Axes, trajectory: flagrs.Trajectory, instant: float) -> Non
         colour = FLAGELLA[0 if edge < head.node else 1] if wet[edge] else "#666666"
         line = [nodes[edges[edge]][:, :2]]
         # A white rim under each edge separates what crosses in front from what crosses behind.
-        axes.add_collection(LineCollection(line, colors="white", linewidths=1.35 * thickness, zorder=2 + depth[edge] / 1e3))
         axes.add_collection(
-            LineCollection(line, colors=colour, linewidths=thickness, capstyle="round", zorder=2 + depth[edge] / 1e3)
+            LineCollection(line, colors="white", linewidths=1.35 * thickness, zorder=2 + depth[edge] / 1e3)
+        )
+        axes.add_collection(
+            LineCollection(
+                line, colors=colour, linewidths=thickness, capstyle="round", zorder=2 + depth[edge] / 1e3
+            )
         )
     axes.text(LEFT + 2.0, HEIGHT / 2 - 3.0, f"{instant:g} s", va="top", fontsize=11)
     axes.set_xlim(LEFT, RIGHT)

@@ -1,8 +1,8 @@
 """Makes every number and figure of fluid.md: regularized Stokeslet segments against references of their own.
 
-Run with ``python docs/validation/make_fluid_figures.py`` (about a minute on one core; needs matplotlib). The tests in
-tests/python/test_fluid_validation.py use the same geometries and references. The viscosity is 1 Pa s throughout, so that
-forces in N are resistances in N s/m.
+Run with ``python docs/validation/make_fluid_figures.py`` (about two minutes on one core; needs matplotlib).
+The tests in tests/python/test_fluid_validation.py use the same geometries and references. The viscosity is
+1 Pa s throughout, so that forces at 1 m/s, in N, are resistances in N s/m.
 """
 
 from __future__ import annotations
@@ -12,12 +12,16 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 from flagrs import Fluid, Material, Rod, Scene, Simulation, fluid
 from flagrs.plot.canvas import COLOURS, dress, legend, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
 
 Array = npt.NDArray[np.float64]
 
@@ -28,9 +32,9 @@ SEED = 1.65 / 1.6
 X = np.array([1.0, 0.0, 0.0])
 
 
-# ---------------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------------------
 # Filaments: polygons of regularized Stokeslet segments
-# ---------------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ class Helix:
 
     @property
     def twist_torque(self) -> float:
-        """Torque of twist drag about the axis at 1 rad/s [N m]: the spin and its torque both along the tangent."""
+        """Torque of twist drag about the axis at 1 rad/s [N m]; spin and torque are along the tangent."""
         return 4.0 * math.pi * self.thickness**2 * self.contour * self.advance**2
 
     def centre(self, arc: Array) -> Array:
@@ -151,7 +155,7 @@ class Helix:
 
 @dataclass(frozen=True)
 class Propulsion:
-    """Drag [N s/m], thrust of rotation [N s], torque of translation [N s] and of rotation [N m s], all along x."""
+    """Drag [N s/m], thrust of rotation, torque of translation [N s] and of rotation [N m s], along x."""
 
     drag: float
     thrust: float
@@ -160,7 +164,11 @@ class Propulsion:
 
     def over(self, other: Propulsion) -> tuple[float, float, float]:
         """Relative differences of drag, thrust and torque."""
-        return (self.drag / other.drag - 1.0, self.thrust / other.thrust - 1.0, self.torque / other.torque - 1.0)
+        return (
+            self.drag / other.drag - 1.0,
+            self.thrust / other.thrust - 1.0,
+            self.torque / other.torque - 1.0,
+        )
 
 
 def propulsion(nodes: Array, resist: Callable[[Array], Array], spin_torque: float = 0.0) -> Propulsion:
@@ -183,32 +191,39 @@ def of_filament(filament: Filament, spin_torque: float = 0.0) -> Propulsion:
 def of_model(helix: Helix, count: int, **options: object) -> Propulsion:
     """Resistances of a helix by one of the fluid models of a simulation."""
     nodes = helix.filament(count).nodes
-    rod = Rod(nodes=nodes, radius=helix.thickness, material=Material(1e6, 0.5, 1000.0))
+    rod = Rod(
+        nodes=nodes,
+        radius=helix.thickness,
+        material=Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1e3),
+    )
     matrix = Simulation(Scene(rods=(rod,), fluid=Fluid(viscosity=1.0, **options)), threads=1).resistance()  # type: ignore[arg-type]
     return propulsion(nodes, lambda velocity: (matrix @ velocity.ravel()).reshape(-1, 3))
 
 
-# ---------------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------------------
 # References
-# ---------------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------------------
 
-#: Axial drag of a torus over that of a sphere around it, by a/R: Majumdar and O'Neill, ZAMP 28 (1977) 541, evaluated.
+#: Axial drag of a torus over that of a sphere around it, by a/R: Majumdar and O'Neill, ZAMP 28 (1977) 541.
 TORUS_EXACT = {0.01: 0.577311201, 0.001: 0.441079950}
 
 
-def ring_flow(radius: float, height: Array, at: Array, count: int) -> Array:
-    """Flow (M, 2, S, 2) at points (r, z) of unit radial and axial force rings of given (S, 2) radii and heights."""
+def ring_flow(rings: Array, at: Array, count: int) -> Array:
+    """Flow (M, 2, S, 2), times 8 pi mu, at points (r, z) of radial and axial force rings (S, 2) at (r, z).
+
+    A ring of strength 1 has the force 1 / (2 pi) per length, integrated at `count` points of half a circle.
+    """
     angle = math.pi * (np.arange(count) + 0.5) / count
     cosine = np.cos(angle)
-    out = np.empty((len(at), 2, len(height), 2))
-    for s, (ring, level) in enumerate(height):
+    out = np.empty((len(at), 2, len(rings), 2))
+    for s, (ring, level) in enumerate(rings):
         for m, (r, z) in enumerate(at):
             dx, dz = r - ring * cosine, z - level
             d2 = dx**2 + (ring * np.sin(angle)) ** 2 + dz**2
             inverse = 1.0 / np.sqrt(d2)
             cube = inverse / d2
             radial = dx * cosine - ring * np.sin(angle) ** 2
-            weight = ring / (radius * count)
+            weight = ring / count
             out[m, 0, s, 0] = weight * (cosine * inverse + dx * radial * cube).sum()
             out[m, 0, s, 1] = weight * (dx * dz * cube).sum()
             out[m, 1, s, 0] = weight * (dz * radial * cube).sum()
@@ -218,21 +233,21 @@ def ring_flow(radius: float, height: Array, at: Array, count: int) -> Array:
 
 def torus_reference(ratio: float, sources: int = 12) -> float:
     """Axial drag of a torus, F / (6 pi mu U (R + a)), by force rings within its cross-section."""
+
     def circle(radius: float, count: int) -> Array:
         angle = 2.0 * math.pi * np.arange(count) / count
         return np.stack([1.0 + radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
     inner, surface = circle(ratio / 4.0, sources), circle(ratio, 2 * sources)
-    # The integrand is analytic in a strip as wide as the gap between sources and surface: exp(-2 n gap) is left.
-    flow = ring_flow(1.0, inner, surface, math.ceil(30.0 / ratio)).reshape(4 * sources, 2 * sources)
+    # Analytic in a strip as wide as the gap between sources and surface, the integrals err by exp(-2 n gap).
+    flow = ring_flow(inner, surface, math.ceil(30.0 / ratio)).reshape(4 * sources, 2 * sources)
     wanted = 8.0 * math.pi * np.tile([0.0, 1.0], len(surface))
     strength = np.linalg.lstsq(flow, wanted, rcond=None)[0].reshape(-1, 2)
-    # The mean over the ring was taken, 2 pi R of line each: the strength's sum over rings is a force over 2 pi R / 2 pi R.
     return float((strength[:, 1] * inner[:, 0]).sum() / (6.0 * math.pi * (1.0 + ratio)))
 
 
 def spheroid_drag(aspect: float, axis: int) -> float:
-    """Drag of a prolate spheroid of unit equatorial radius at 1 m/s: Chwang and Wu, J. Fluid Mech. 67 (1975) 787."""
+    """Drag of a prolate spheroid of unit equatorial radius: Chwang and Wu, J. Fluid Mech. 67 (1975) 787."""
     e = math.sqrt(1.0 - 1.0 / aspect**2)
     log = math.log((1.0 + e) / (1.0 - e))
     if axis == 0:
@@ -243,14 +258,14 @@ def spheroid_drag(aspect: float, axis: int) -> float:
 def cylinder_series(slenderness: float, axis: int, terms: int) -> float:
     """Drag of a cylinder of unit radius and length L at 1 m/s by slender-body theory, to powers of 1/ln(L/a).
 
-    Batchelor, J. Fluid Mech. 44 (1970) 419, equations 8.9 and 8.10, gives three terms. The equation behind them (Keller
-    and Rubinow 1976) reads ``(2 ln(L/a) - h) f + K f = c pi mu U`` with ``h = +-1 - ln(1 - x^2)`` and
-    ``K f = integral of (f(y) - f(x)) / |y - x|``, K having the Legendre polynomials for eigenfunctions with eigenvalues
-    ``-2 H_n``; iterated once more it gives the fourth.
+    Batchelor, J. Fluid Mech. 44 (1970) 419, gives three terms. The equation behind them (Keller and Rubinow,
+    J. Fluid Mech. 75 (1976) 705) is ``(2 ln(L/a) - h) f + K f = c pi mu U`` with ``h = +-1 - ln(1 - x^2)``
+    and ``K f = integral of (f(y) - f(x)) / |y - x|``, whose eigenfunctions are the Legendre polynomials, with
+    eigenvalues ``-2 H_n``; iterated once more it gives the fourth.
     """
     sign, factor = (1.0, 2.0) if axis == 0 else (-1.0, 4.0)
     abscissa, weight = np.polynomial.legendre.leggauss(400)
-    # ln(1 - x^2) integrated in x = tanh(9 t), where nothing is singular; the weight dies as the ends are neared.
+    # In x = tanh(9 t) nothing is singular.
     stretch = 9.0 * abscissa
     measure = weight * 4.5 / np.cosh(stretch) ** 2
     h = sign + 2.0 * np.log(np.cosh(stretch))
@@ -260,7 +275,9 @@ def cylinder_series(slenderness: float, axis: int, terms: int) -> float:
     means = [float((measure * h**power).sum()) for power in range(4)]
     coefficients = [1.0, means[1] / 2.0, means[2] / 4.0, (means[3] - hkh) / 8.0]
     small = 1.0 / math.log(slenderness)
-    return factor * math.pi * slenderness * sum(c * small ** (k + 1) for k, c in enumerate(coefficients[:terms]))
+    return (
+        factor * math.pi * slenderness * sum(c * small ** (k + 1) for k, c in enumerate(coefficients[:terms]))
+    )
 
 
 @dataclass(frozen=True)
@@ -274,8 +291,7 @@ class Tube:
 
     def points(self, radius: float, step: float, around: int) -> Array:
         """Points on the surface a distance `radius` from the centreline, in rings `step` apart, staggered."""
-        rings = math.ceil(self.length / step)
-        arcs = self.length * np.arange(rings + 1) / rings
+        arcs = np.linspace(0.0, self.length, math.ceil(self.length / step) + 1)
         out = [self._ring(arc, 1.0, radius, 0.0, around, k) for k, arc in enumerate(arcs)]
         caps = max(2, round(around / 4))
         for arc, outward in ((0.0, -1.0), (self.length, 1.0)):
@@ -285,7 +301,9 @@ class Tube:
                 out.append(self._ring(arc, outward, radius, latitude, count, k))
         return np.concatenate(out)
 
-    def _ring(self, arc: float, outward: float, radius: float, latitude: float, count: int, stagger: int) -> Array:
+    def _ring(
+        self, arc: float, outward: float, radius: float, latitude: float, count: int, stagger: int
+    ) -> Array:
         centre, tangent = self.centre(np.array(arc)), outward * self.tangent(np.array(arc))
         first = np.cross(tangent, np.eye(3)[np.argmin(np.abs(tangent))])
         first /= np.linalg.norm(first)
@@ -298,16 +316,18 @@ class Tube:
 def surface_solution(tube: Tube, step: float = 1.0, around: int = 6, depth: float = 0.5) -> Propulsion:
     """Resistances of a rigid tube along x by the method of fundamental solutions.
 
-    Point forces on the tube of `depth` times the radius, in rings `step` radii apart with `around` points each, are fitted
-    to the velocity at about twice as many points of the surface. No slenderness is assumed: what is left is the error of the
-    fit. The coupling of translation and rotation, found twice, tells its size.
+    Point forces on the tube of `depth` times the radius, in rings `step` radii apart with `around` points
+    each, are fitted to the velocity at about twice as many points of the surface. No slenderness is assumed:
+    what is left is the error of the fit, which a finer one tells.
     """
     a = tube.radius
     sources = tube.points(depth * a, step * a, around)
     surface = tube.points(a, step * a / 1.4, round(1.4 * around))
     offset = surface[:, None] - sources[None]
     inverse = 1.0 / np.linalg.norm(offset, axis=2)
-    flow = (offset * inverse[:, :, None] ** 1.5)[:, :, :, None] * (offset * inverse[:, :, None] ** 1.5)[:, :, None, :]
+    flow = (offset * inverse[:, :, None] ** 1.5)[:, :, :, None] * (offset * inverse[:, :, None] ** 1.5)[
+        :, :, None, :
+    ]
     for k in range(3):
         flow[:, :, k, k] += inverse
     matrix = flow.transpose(0, 2, 1, 3).reshape(3 * len(surface), 3 * len(sources))
@@ -334,9 +354,9 @@ def straight_tube(length: float, axis: int) -> Tube:
     return Tube(lambda arc: np.asarray(arc)[..., None] * direction, lambda arc: direction, length, 1.0)
 
 
-# ---------------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------------------
 # Properties of the matrix
-# ---------------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------------------
 
 
 def asymmetry(filament: Filament) -> tuple[float, float]:
@@ -364,17 +384,14 @@ def zigzag_gain(filament: Filament) -> float:
     across = np.tile([0.0, 1.0, 0.0], (count, 1))
     zigzag = across * (-1.0) ** np.arange(count)[:, None]
     inner = slice(count // 4, -(count // 4))
-    return float(np.abs(filament.density(zigzag)[inner]).max() / np.abs(filament.density(across)[inner]).max())
+    return float(
+        np.abs(filament.density(zigzag)[inner]).max() / np.abs(filament.density(across)[inner]).max()
+    )
 
 
-def turning_points(density: Array) -> int:
-    """How often the density across a rod goes up and down, from node to node."""
-    return int((np.diff(np.sign(np.diff(density))) != 0).sum())
-
-
-# ---------------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------------------
 # The studies of fluid.md
-# ---------------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------------------
 
 
 def table(title: str, heads: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
@@ -385,6 +402,13 @@ def table(title: str, heads: Iterable[str], rows: Iterable[Iterable[object]]) ->
         print("| " + " | ".join(str(cell) for cell in row) + " |")
 
 
+def plain_ticks(axis: Axis, values: Iterable[float]) -> None:
+    """Label a logarithmic axis at a few values, in plain numbers."""
+    values = list(values)
+    axis.set_ticks(values, labels=[f"{value:g}" for value in values])
+    axis.set_ticks([], minor=True)
+
+
 def percent(value: float, digits: int = 2) -> str:
     """A relative difference in per cent."""
     return f"{100.0 * value:+.{digits}f} %"
@@ -393,12 +417,20 @@ def percent(value: float, digits: int = 2) -> str:
 def study_torus() -> None:
     """Mesh and slenderness of the torus."""
     counts = [12, 24, 48, 96, 192]
-    errors = {ratio: [torus_drag(ratio, n) / exact - 1.0 for n in counts] for ratio, exact in TORUS_EXACT.items()}
+    errors = {
+        ratio: [torus_drag(ratio, n) / exact - 1.0 for n in counts] for ratio, exact in TORUS_EXACT.items()
+    }
     table(
         "torus, mesh",
         ["edges", *(f"a/R = {ratio:g}: |e|/eps, F*, error" for ratio in errors)],
         [
-            [n, *(f"{2 * math.pi / n / (SLENDER * r):.1f}, {torus_drag(r, n):.9f}, {percent(e[k], 4)}" for r, e in errors.items())]
+            [
+                n,
+                *(
+                    f"{2 * math.pi / n / (SLENDER * r):.1f}, {torus_drag(r, n):.9f}, {percent(e[k], 4)}"
+                    for r, e in errors.items()
+                ),
+            ]
             for k, n in enumerate(counts)
         ],
     )
@@ -417,11 +449,18 @@ def study_torus() -> None:
     for colour, (ratio, error) in zip(COLOURS, errors.items(), strict=False):
         left.loglog(counts, np.abs(error), "o-", color=colour, label=f"a/R = {ratio:g}")
     left.loglog(counts, 0.09 / np.array(counts, dtype=float) ** 2, "--", color="grey", label="second order")
+    plain_ticks(left.xaxis, counts)
     dress(left, "edges of the ring", "relative error of the drag", "refining the mesh")
     legend(left)
     right.loglog(ratios, np.abs(slender), "o-", color=COLOURS[0], label=r"$\epsilon = \sqrt{e}\,a$")
     squares = np.array(ratios)
-    right.loglog(squares, 0.25 * squares**2 * np.log(8.0 / squares), "--", color="grey", label=r"$\frac{1}{4}(a/R)^2\ln(8R/a)$")
+    right.loglog(
+        squares,
+        0.17 * squares**2 * np.log(8.0 / squares),
+        "--",
+        color="grey",
+        label=r"$\propto (a/R)^2\ln(8R/a)$",
+    )
     dress(right, "a/R", "relative error of the drag", "finest mesh")
     legend(right)
     figure.savefig(FIGURES / "fluid_torus.png", dpi=130)
@@ -437,7 +476,11 @@ def study_straight() -> None:
 
     meshes = [10, 20, 40, 80, 160]
     converging = [[spheroid(1000, n).drag(k) / spheroid_drag(1000, k) - 1.0 for k in (0, 1)] for n in meshes]
-    table("spheroid of aspect 1000, mesh", ["edges", "along", "across"], [[n, *(percent(e, 4) for e in row)] for n, row in zip(meshes, converging, strict=True)])
+    table(
+        "spheroid of aspect 1000, mesh",
+        ["edges", "along", "across"],
+        [[n, *(percent(e, 4) for e in row)] for n, row in zip(meshes, converging, strict=True)],
+    )
 
     slenderness = [2e1, 6e1, 2e2, 2e3, 2e4, 2e5, 2e6]
     rows, differences = [], {}
@@ -456,23 +499,32 @@ def study_straight() -> None:
     for length in (8.0, 18.0, 38.0):
         cells = []
         for axis in (0, 1):
-            reference = surface_solution(straight_tube(length, axis), 0.5, 8).drag
+            reference = surface_solution(straight_tube(length, axis), 0.8, 12).drag
             drag = straight(length, int(length / SLENDER), SLENDER).drag(axis)
             longer = straight(length + 2.0, int((length + 2.0) / SLENDER), SLENDER).drag(axis)
-            cells.append(f"{reference:.3f}, {percent(drag / reference - 1.0)}, {percent(longer / reference - 1.0)}")
+            cells.append(
+                f"{reference:.3f}, {percent(drag / reference - 1.0)}, {percent(longer / reference - 1.0)}"
+            )
         rows.append([length + 2.0, *cells])
-    table("capsule: F/(mu U a), segments from cap centre to cap centre, from tip to tip", ["length / a", "along", "across"], rows)
+    table(
+        "capsule: F/(mu U a), segments from cap centre to cap centre, from tip to tip",
+        ["length / a", "along", "across"],
+        rows,
+    )
 
     rows = []
-    for count in (12, 25, 50, 100):
-        rod = straight(100.0, count, SLENDER)
+    for length, count in ((80.0, 25), (100.0, 50), (200.0, 50), (200.0, 100), (400.0, 100), (400.0, 200)):
+        rod = straight(length, count, SEED)
         cells = []
         for axis in (0, 1):
-            velocity = np.tile(np.eye(3)[axis], (count + 1, 1))
-            lumped = rod.density(velocity)[:, axis].sum() * 100.0 / count
+            lumped = rod.density(np.tile(np.eye(3)[axis], (count + 1, 1)))[:, axis].sum() * length / count
             cells.append(percent(lumped / rod.drag(axis) - 1.0, 1))
-        rows.append([count, f"{100.0 / count / SLENDER:.2f}", *cells])
-    table("nodal force |e| f in place of W f, L/a = 100", ["edges", "|e|/eps", "along", "across"], rows)
+        rows.append([f"{length:g}", count, f"{length / count / SEED:.2f}", *cells])
+    table(
+        "straight rod, nodal force |e| f in place of W f",
+        ["L/a", "edges", "|e|/eps", "along", "across"],
+        rows,
+    )
 
     figure = new_figure(9.0, 3.6)
     left, right = figure.subplots(1, 2)
@@ -485,10 +537,10 @@ def study_straight() -> None:
     for axis, name in ((0, "along"), (1, "across")):
         for k, style in ((0, "s:"), (1, "^--"), (2, "o-")):
             values = [abs(differences[ratio, axis][k]) for ratio in slenderness]
-            right.loglog(small, values, style, color=COLOURS[axis], label=f"{name}, {k + 2} terms", markersize=4)
-    ticks = [0.07, 0.1, 0.2, 0.3]
-    right.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
-    right.minorticks_off()
+            right.loglog(
+                small, values, style, color=COLOURS[axis], label=f"{name}, {k + 2} terms", markersize=4
+            )
+    plain_ticks(right.xaxis, [0.07, 0.1, 0.2, 0.3])
     dress(right, "1 / ln(L/a)", "relative difference", "cylinder, against slender-body series")
     legend(right)
     figure.savefig(FIGURES / "fluid_straight.png", dpi=130)
@@ -497,9 +549,10 @@ def study_straight() -> None:
 def study_helix() -> None:
     """Thrust, drag and torque of rigid helices."""
     seed = Helix()
-    start = time.perf_counter()
-    references = [surface_solution(helix_tube(seed), step, around) for step, around in ((1.0, 6), (0.8, 8), (0.6, 8))]
-    print(f"\nsurface solutions of the seed's helix: {time.perf_counter() - start:.1f} s")
+    sphere = surface_solution(straight_tube(0.0, 0), 0.8, 12).drag / (6.0 * math.pi) - 1.0
+    print(f"\nsurface solution of a sphere, error of the drag: {percent(sphere, 3)}")
+    fits = ((1.0, 6), (0.8, 8), (0.8, 12))
+    references = [surface_solution(helix_tube(seed), step, around) for step, around in fits]
     exact = references[-1]
     spin = seed.twist_torque
     columns = ["", "drag [N s/m]", "thrust [mN s]", "torque [uN m s]", "thrust from translation [mN s]"]
@@ -510,7 +563,9 @@ def study_helix() -> None:
             numbers = [f"{n} ({percent(d, 1)})" for n, d in zip(numbers, p.over(exact), strict=True)]
         return [name, *numbers, f"{1e3 * p.coupled_torque:.4f}"]
 
-    rows = [row(f"surface, {step} a, {k} around", p, False) for (step, k), p in zip(((1.0, 6), (0.8, 8), (0.6, 8)), references, strict=True)]
+    rows = [
+        row(f"surface, {step} a, {k} around", p, False) for (step, k), p in zip(fits, references, strict=True)
+    ]
     for name, ratio in (("slender", SLENDER), ("seed", SEED)):
         for count in (25, 48):
             filament = seed.filament(count, ratio)
@@ -518,45 +573,91 @@ def study_helix() -> None:
             rows.append(row(f"segments, eps {name}, {count} edges", of_filament(filament)))
     arc = seed.pitch / seed.advance
     for coefficients, wavelength in (("gray-hancock", seed.pitch), ("lighthill", arc)):
-        rows.append(row(f"{coefficients}, 200 edges", of_model(seed, 200, model="RFT", coefficients=coefficients, wavelength=wavelength)))
+        rows.append(
+            row(
+                f"{coefficients}, 200 edges",
+                of_model(seed, 200, model="RFT", coefficients=coefficients, wavelength=wavelength),
+            )
+        )
     table("the seed's helix, pitch/R = 7", columns, rows)
+    twist = []
     for pitch in (5.0, 7.0, 9.0):
         helix = Helix(pitch=pitch * Helix.radius)
         counts = (int(helix.contour / 5e-3), int(helix.contour / (SLENDER * helix.thickness)))
-        shares = [helix.twist_torque / of_filament(helix.filament(n, r)).torque for r in (SEED, SLENDER) for n in counts]
-        print(f"twist drag over Stokeslet torque, pitch/R = {pitch:g}, edges {counts}: eps seed {shares[:2]}, slender {shares[2:]}")
+        shares = [
+            helix.twist_torque / of_filament(helix.filament(n, r)).torque
+            for r in (SEED, SLENDER)
+            for n in counts
+        ]
+        twist.append([f"{pitch:g}", f"{counts[0]}, {counts[1]}", *(percent(share, 1) for share in shares)])
+    heads = ["pitch/R", "edges", "eps seed, 5 mm", "fine", "eps slender, 5 mm", "fine"]
+    table("twist drag over the Stokeslets' torque", heads, twist)
 
-    radii = [1.6e-3, 0.8e-3, 0.4e-3]
+    rows = []
+    for count in (12, 25, 48):
+        filament = seed.filament(count, SEED)
+        edge = float(np.linalg.norm(filament.nodes[1] - filament.nodes[0]))
+        lumped = propulsion(filament.nodes, lambda velocity, one=filament, e=edge: e * one.density(velocity))
+        rows.append([count, *(percent(d, 1) for d in lumped.over(of_filament(filament)))])
+    table("the seed's helix, nodal force |e| f in place of W f", ["edges", "drag", "thrust", "torque"], rows)
+
+    # The finest fits that a gigabyte and half a minute allow.
+    fitted = {1.6e-3: (0.8, 12), 0.8e-3: (0.8, 8), 0.4e-3: (1.0, 8)}
     differences, rows = [], []
-    for radius in radii:
+    for radius, fit in fitted.items():
         helix = Helix(axial_length=Helix.pitch, thickness=radius)
-        reference = surface_solution(helix_tube(helix))
+        reference = surface_solution(helix_tube(helix), *fit)
         filament = helix.filament(int(helix.contour / (SLENDER * radius)))
         differences.append(of_filament(filament, helix.twist_torque).over(reference))
         bare = of_filament(filament).over(reference)[2]
         rows.append([f"{radius / helix.radius:.4f}", *(percent(d) for d in differences[-1]), percent(bare)])
-    table("one turn, against the surface solution", ["a/R", "drag", "thrust", "torque", "torque without twist drag"], rows)
+    table(
+        "one turn, against the surface solution",
+        ["a/R", "drag", "thrust", "torque", "torque without twist drag"],
+        rows,
+    )
 
     thin = Helix(thickness=0.02e-3)
     counts = [20, 40, 80, 160, 320]
-    finest = {name: of_filament(make(640)) for name, make in (("blunt", thin.filament), ("tapered", thin.tapered))}
-    errors = {name: [of_filament(make(n)).over(finest[name]) for n in counts] for name, make in (("blunt", thin.filament), ("tapered", thin.tapered))}
+    finest = {
+        name: of_filament(make(640)) for name, make in (("blunt", thin.filament), ("tapered", thin.tapered))
+    }
+    errors = {
+        name: [of_filament(make(n)).over(finest[name]) for n in counts]
+        for name, make in (("blunt", thin.filament), ("tapered", thin.tapered))
+    }
     for name, found in errors.items():
-        table(f"mesh, {name} ends, a = 0.02 mm, against 640 edges", ["edges", "drag", "thrust", "torque"], [[n, *(percent(d, 3) for d in e)] for n, e in zip(counts, found, strict=True)])
+        table(
+            f"mesh, {name} ends, a = 0.02 mm, against 640 edges",
+            ["edges", "drag", "thrust", "torque"],
+            [[n, *(percent(d, 3) for d in e)] for n, e in zip(counts, found, strict=True)],
+        )
 
     figure = new_figure(9.0, 3.6)
     left, right = figure.subplots(1, 2)
-    for k, name in enumerate(("drag", "thrust", "torque")):
-        left.loglog([r / seed.radius for r in radii], [abs(d[k]) for d in differences], "o-", color=COLOURS[k], label=name)
-    ticks = [r / seed.radius for r in radii]
-    left.set_xticks(ticks, [f"{tick:.3f}" for tick in ticks])
-    left.minorticks_off()
+    for k, name in ((0, "drag"), (2, "torque")):
+        left.loglog(
+            [r / seed.radius for r in fitted],
+            [abs(d[k]) for d in differences],
+            "o-",
+            color=COLOURS[k],
+            label=name,
+        )
+    plain_ticks(left.xaxis, [round(r / seed.radius, 3) for r in fitted])
+    left.set_ylim(1e-3, 1e-1)
     dress(left, "a/R", "relative difference", "one turn, against the surface solution")
     legend(left)
     for name, style in (("blunt", "s:"), ("tapered", "o-")):
         for k, quantity in ((0, "drag"), (2, "torque")):
-            right.loglog(counts, [abs(e[k]) for e in errors[name]], style, color=COLOURS[k], label=f"{quantity}, {name} ends")
+            right.loglog(
+                counts,
+                [abs(e[k]) for e in errors[name]],
+                style,
+                color=COLOURS[k],
+                label=f"{quantity}, {name} ends",
+            )
     right.loglog(counts, 60.0 / np.array(counts, dtype=float) ** 2, "--", color="grey", label="second order")
+    plain_ticks(right.xaxis, counts)
     dress(right, "edges", "relative difference from 640 edges", "refining a thin helix")
     legend(right)
     figure.savefig(FIGURES / "fluid_helix.png", dpi=130)
@@ -571,12 +672,35 @@ def study_matrix() -> None:
         rod = straight(60.0, round(60.0 / ratio), 1.0)
         helix = seed.filament(max(8, round(seed.contour / (ratio * SLENDER * seed.thickness))))
         density = rod.density(np.tile([0.0, 1.0, 0.0], (len(rod.nodes), 1)))[:, 1]
-        values = (condition(rod), condition(helix), zigzag_gain(rod), density.max() / np.median(density), turning_points(density))
+        values = (
+            condition(rod),
+            condition(helix),
+            zigzag_gain(rod),
+            density.max() / np.median(density),
+            density.min() / np.median(density),
+        )
         found.append(values[:3])
-        rows.append([ratio, len(rod.edges), *(f"{v:.3g}" for v in values[:4]), values[4], *(f"{100 * v:.2g} %" for v in asymmetry(helix))])
+        rows.append(
+            [
+                ratio,
+                len(rod.edges),
+                *(f"{v:.3g}" for v in values),
+                *(f"{100 * v:.2g} %" for v in asymmetry(helix)),
+            ]
+        )
     table(
         "matrix",
-        ["|e|/eps", "edges of the rod", "cond, rod", "cond, seed's helix", "zigzag gain", "end/middle density", "turning points", "asymmetry inside", "with an end"],
+        [
+            "|e|/eps",
+            "edges of the rod",
+            "cond, rod",
+            "cond, seed's helix",
+            "zigzag gain",
+            "highest density",
+            "lowest density",
+            "asymmetry inside",
+            "with an end",
+        ],
         rows,
     )
     figure = new_figure(9.0, 3.6)
@@ -585,16 +709,31 @@ def study_matrix() -> None:
     left.loglog(ratios, columns[:, 0], "o-", color=COLOURS[0], label="straight rod, L = 60 eps")
     left.loglog(ratios, columns[:, 1], "s-", color=COLOURS[1], label="seed's helix")
     short = np.array(ratios)[np.array(ratios) <= 1.0]
-    left.loglog(short, 6.0 * np.exp(math.pi / short), "--", color="grey", label=r"$\propto e^{\pi\epsilon/|e|}$")
+    left.loglog(
+        short, 6.0 * np.exp(math.pi / short), "--", color="grey", label=r"$\propto e^{\pi\epsilon/|e|}$"
+    )
     left.axvline(1.0, color="grey", linewidth=0.8)
+    plain_ticks(left.xaxis, [0.2, 0.5, 1.0, 2.0, 5.0])
     dress(left, "|e| / eps", "condition number of A", "conditioning")
     legend(left)
     for k, ratio in enumerate((2.0, 1.0, 0.5, 0.25)):
         rod = straight(60.0, round(60.0 / ratio), 1.0)
         density = rod.density(np.tile([0.0, 1.0, 0.0], (len(rod.nodes), 1)))[:, 1]
         near = rod.nodes[:, 0] <= 8.0
-        right.plot(rod.nodes[near, 0], density[near] / np.median(density), ".-", color=COLOURS[k], label=f"|e| = {ratio:g} eps")
-    dress(right, "distance from the end / eps", "force density / median", "density near a blunt end, motion across")
+        right.plot(
+            rod.nodes[near, 0],
+            density[near] / np.median(density),
+            ".-",
+            color=COLOURS[k],
+            label=f"|e| = {ratio:g} eps",
+        )
+    right.set_yscale("symlog", linthresh=10.0)
+    dress(
+        right,
+        "distance from the end / eps",
+        "force density / median",
+        "density near a blunt end, motion across",
+    )
     legend(right)
     figure.savefig(FIGURES / "fluid_conditioning.png", dpi=130)
 

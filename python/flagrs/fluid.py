@@ -8,8 +8,8 @@ import numpy as np
 
 from flagrs import _flagrs
 from flagrs.errors import SceneError
-from flagrs.scene.shapes import number
-from flagrs.scene.values import Bounds, FloatArray, IntArray
+from flagrs.scene.shapes import number, whole
+from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
 
 __all__ = ["hat_weights", "mobility", "velocity"]
 
@@ -35,8 +35,8 @@ def mobility(
     Returns
     -------
     ndarray
-        A (3M, 3N) [m]; rows are target components, columns node components. By collocation it is not
-        symmetric.
+        A (3M, 3N), dimensionless; rows are target components, columns node components. By collocation it is
+        not symmetric.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def mobility(
     """
     points, pairs, widths = _segments(nodes, edges, epsilon)
     at = points if targets is None else _vectors("targets", targets)
-    return _flagrs.mobility(points, pairs, widths, at, _flagrs.thread_count(threads))
+    return _flagrs.mobility(points, pairs, widths, at, _threads(threads))
 
 
 def velocity(
@@ -106,7 +106,7 @@ def velocity(
         raise _wrong("force_density", f"shape {density.shape}", f"of shape {sources.shape}")
     mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
-    return _flagrs.velocity(at, sources, pairs, density, mu, widths, _flagrs.thread_count(threads))
+    return _flagrs.velocity(at, sources, pairs, density, mu, widths, _threads(threads))
 
 
 def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:
@@ -120,6 +120,10 @@ def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:
     if density.shape != points.shape:
         raise _wrong("force_density", f"shape {density.shape}", f"of shape {points.shape}")
     return _flagrs.hat_weights(points, pairs, density)
+
+
+def _threads(asked: int | None) -> int:
+    return _flagrs.thread_count(None if asked is None else whole("threads", asked))
 
 
 def _wrong(field: str, value: Any, allowed: str) -> SceneError:
@@ -140,10 +144,11 @@ def _vectors(field: str, value: Any) -> FloatArray:
 
 def _segments(nodes: Any, edges: Any, epsilon: Any) -> tuple[FloatArray, IntArray, FloatArray]:
     points = _vectors("nodes", nodes)
-    pairs = np.ascontiguousarray(edges, dtype=np.int64)
-    if pairs.ndim != 2 or pairs.shape[1] != 2:
-        raise _wrong("edges", f"shape {pairs.shape}", "of shape (E, 2)")
-    valid = (pairs >= 0) & (pairs < len(points))
+    try:
+        pairs = index_pairs(edges)
+    except (SceneError, ValueError) as error:
+        raise _wrong("edges", repr(edges), "integers >= 0 of shape (E, 2)") from error
+    valid = pairs < len(points)
     if not valid.all() or (pairs[:, 0] == pairs[:, 1]).any():
         raise _wrong("edges", "an edge", f"two different nodes in 0..{len(points) - 1}")
     lengths = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)

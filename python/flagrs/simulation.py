@@ -17,7 +17,7 @@ from flagrs.assemble import edges_of, native_scene
 from flagrs.errors import SceneError
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
-from flagrs.scene.shapes import number
+from flagrs.scene.shapes import number, whole
 from flagrs.scene.values import Bounds, FloatArray, IntArray
 from flagrs.time_step import STABLE_SHARE, default_step, explicit_limit
 from flagrs.trajectory import Trajectory
@@ -84,13 +84,8 @@ class Simulation:
                 value=rtol,
                 allowed="None",
             )
-        if threads is not None and (not isinstance(threads, int) or threads < 1):
-            raise SceneError(
-                f"threads: {threads} is not allowed; must be an integer >= 1",
-                field="threads",
-                value=threads,
-                allowed="an integer >= 1",
-            )
+        if threads is not None:
+            whole("threads", threads)
         step = default_step(scene) if dt is None else number("dt", dt, Bounds("s", above=0.0))
         _check_scheme(scene, scheme)
         self._scene = scene
@@ -203,14 +198,7 @@ class Simulation:
         SceneError
             If n is not a whole number, at least 0, or a motor's function gives anything but a finite number.
         """
-        if not isinstance(n, int | np.integer) or n < 0:
-            raise SceneError(
-                f"n: {n} is not allowed; must be an integer >= 0",
-                field="n",
-                value=n,
-                allowed="an integer >= 0",
-            )
-        self._native.step(int(n))
+        self._native.step(whole("n", n, least=0))
 
     def run(
         self,

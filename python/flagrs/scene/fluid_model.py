@@ -45,7 +45,8 @@ class Fluid(Part):
     coefficients : str
         Drag coefficients of resistive force theory: ``gray-hancock`` or ``lighthill``.
     wavelength : float or None
-        Wavelength of the filaments for these coefficients [m]; None: the immersed length of each rod.
+        Wavelength of the filaments for these coefficients [m]: the pitch of a helix for ``gray-hancock``, the
+        arc length of a turn for ``lighthill``. None: the immersed length of each rod, for straight ones.
     density : float
         Density of the fluid [kg/m^3], for buoyancy under gravity.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -130,6 +131,12 @@ def _terms(scene: Scene) -> tuple[list[str], list[str]]:
     return [elastic, *filter(None, words.values())], [term for term, text in words.items() if not text]
 
 
+#: Edge length over regularization below which the force density at the ends changes sign, and from which it
+#: is smooth (docs/validation/fluid.md); the condition number grows as 10 exp(pi epsilon / |e|).
+SHORT_EDGE = 1.3
+CURED_EDGE = 1.5
+
+
 def _warnings(scene: Scene) -> list[str]:
     found = []
     fluid = scene.fluid
@@ -147,14 +154,16 @@ def _warnings(scene: Scene) -> list[str]:
 
 
 def _conditioning(rod: int, ratio: FloatArray) -> list[str]:
-    """Return the warning for edges shorter than the regularization, where the force density oscillates."""
-    short = int((ratio < 1.0).sum())
+    """Return the warning for edges too short for the regularization, where the force density oscillates."""
+    short = int((ratio < SHORT_EDGE).sum())
     if short == 0:
         return []
+    least = float(ratio.min())
+    condition = 10.0 * math.exp(min(math.pi / least, 300.0))
     return [
-        f"rods[{rod}]: {short} immersed edges are shorter than the regularization "
-        f"(down to {ratio.min():.2g} of it); the fluid matrix is ill-conditioned there: "
-        "use longer edges or a smaller epsilon"
+        f"rods[{rod}]: {short} immersed edges are shorter than {SHORT_EDGE:g} times the regularization "
+        f"(down to {least:.2g} of it): the fluid matrix has a condition number of about {condition:.0e} and "
+        f"the force density oscillates; use edges of at least {CURED_EDGE:g} epsilon, or a smaller epsilon"
     ]
 
 
