@@ -11,7 +11,7 @@ def tip_deflection(load: float, compliance: float = 0.0) -> np.ndarray:
     """Return vertical and horizontal deflection of the tip over the length L.
 
     The angle theta of the tangent below the horizontal obeys ``theta'' = -load (1 + e) cos(theta)`` with the
-    strain ``e = load compliance sin(theta)``, ``theta(0) = 0`` and ``theta'(1) = 0``, in the arc length of the
+    strain ``e = load compliance sin(theta)``, ``theta(0) = 0``, ``theta'(1) = 0``, in the arc length of the
     unstretched rod over L.
 
     Parameters
