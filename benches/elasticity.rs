@@ -45,10 +45,8 @@ impl Chain {
             stiffness: scene.bending[k].map(|row| row.map(|entry| entry / voronoi(k))),
             natural: configuration.strain(k).kappa,
         });
-        let twisting = (0..nodes - 2).map(|k| Twisting {
-            stiffness: scene.twisting[k] / voronoi(k),
-            natural: configuration.strain(k).tau,
-        });
+        let twisting = (0..nodes - 2)
+            .map(|k| Twisting { stiffness: scene.twisting[k] / voronoi(k), natural: configuration.strain(k).tau });
         let elements = (0..nodes - 2).map(|hinge| HingeElement::new(&network, hinge, None)).collect();
         let mut hinges = Hinges::new(elements, bending.collect(), twisting.collect());
         let mut stretching = Stretching::new(&network, scene.stretching.clone(), rest_lengths.clone());
