@@ -19,7 +19,14 @@ from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
 from flagrs.scene.shapes import number, whole
 from flagrs.scene.values import Bounds, FloatArray, IntArray
-from flagrs.time_step import STABLE_SHARE, default_step, explicit_limit
+from flagrs.time_step import (
+    LOCAL_SHARE,
+    RESIDUAL_SHARE,
+    STABLE_SHARE,
+    default_step,
+    explicit_limit,
+    size,
+)
 from flagrs.trajectory import Trajectory
 
 #: Where runs are saved when no path is given.
@@ -44,7 +51,9 @@ class Simulation:
         Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit
         for the explicit scheme.
     rtol
-        Reserved for adaptive steps; must be None.
+        Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error of
+        node positions, relative to the size of the filaments (`flagrs.time_step.size`). None: steps of `dt`, first
+        order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all. Results do not depend on it.
 
@@ -78,11 +87,13 @@ class Simulation:
                 allowed="a flagrs.Scene",
             )
         if rtol is not None:
+            number("rtol", rtol, Bounds("1", at_least=1e-8, at_most=0.1))
+        if rtol is not None and scheme == "explicit":
             raise SceneError(
-                f"rtol: {rtol} is not allowed; must be None: this release takes fixed steps, see dt",
+                f"rtol: {rtol} is not allowed with the explicit scheme; must be None",
                 field="rtol",
                 value=rtol,
-                allowed="None",
+                allowed="None with the explicit scheme",
             )
         if threads is not None:
             whole("threads", threads)
@@ -92,6 +103,8 @@ class Simulation:
         self._native = _flagrs.Simulation(native_scene(scene), scheme, step, _flagrs.thread_count(threads))
         self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
         self._restored: Path | None = None
+        if rtol is not None:
+            self._native.set_tolerance((LOCAL_SHARE * rtol * size(scene), RESIDUAL_SHARE * rtol))
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
 
@@ -238,13 +251,13 @@ class Simulation:
         with recorder:
             if not again:
                 recorder.append(self.frame())
-            for time in _frame_times(self.time, end, every):
-                self._reach(time)
-                recorder.append(self.frame())
+            start = recorder.last_time if again else self.time
+            for time in _frame_times(start, end, every):
+                recorder.append(self._frame_at(time, end))
                 if recorder.frame_count % CHECKPOINT_FRAMES == 0:
                     recorder.checkpoint(self.state())
                 if progress is not None:
-                    progress(self.time)
+                    progress(time)
             recorder.checkpoint(self.state())
         return recorder.trajectory()
 
@@ -260,6 +273,14 @@ class Simulation:
 
     def _recorder(self, path: Path | None) -> Recorder:
         return Recorder(path, self._scene, self._settings)
+
+    def _frame_at(self, time: float, end: float) -> dict[str, Any]:
+        """Return the frame at a time, reached by fixed steps or interpolated between adaptive ones."""
+        if self._settings["rtol"] is None:
+            self._reach(time)
+            return self.frame()
+        self._native.advance_past(time, end)
+        return self._native.frame_at(time)
 
     def _reach(self, time: float) -> None:
         """Step to a time exactly, in equal steps no longer than `dt`."""

@@ -1,8 +1,13 @@
-//! The force balance of one step: residual, derivative, and the solution of its linear systems.
+//! The force balance of one step: residual and derivative.
 //!
-//! The derivative is sparse but for the nonlocal fluid, whose action costs one dense back-substitution. Systems are solved by
-//! GMRES with the sparse part plus every node's own resistance, factored, as preconditioner: exact for local models, where
-//! GMRES stops after one iteration. Should GMRES fail, the matrix is formed and factored densely.
+//! The unknowns are the degrees of freedom `q` and, if the fluid is nonlocal and implicit, the force density `f` on it at the
+//! immersed nodes. The balance has two parts,
+//!
+//! ```text
+//!   r1 = dE/dq + W f + dissipation - loads - contact,        r2 = A f - 8 pi mu dx/dt,
+//! ```
+//!
+//! so that no dense matrix is ever factored. How the linear systems are solved is told in [`super::solve`].
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,14 +15,15 @@ use std::time::Instant;
 use rayon::ThreadPool;
 
 use super::model::Model;
+use super::predictor::derivative_weights;
 use super::scheme::Scheme;
 use super::state::State;
 use super::statistics::Statistics;
 use crate::elastic::motors::Drive;
 use crate::fluid::FluidModel;
 use crate::linear::LinearError;
-use crate::linear::dense::DenseLu;
-use crate::linear::krylov::{Gmres, LinearOperator};
+use crate::linear::krylov::Gmres;
+use crate::linear::ldlt::SparseLdlt;
 use crate::linear::sparse::SparseLu;
 use crate::rod::assembly::{Assembly, Increment, Term};
 use crate::rod::configuration::{Configuration, ShaftAngle};
@@ -27,21 +33,64 @@ use crate::{Mat3, Vec3};
 const KRYLOV_LIMIT: usize = 120;
 
 /// What is given for a step: its length, scheme, and what motors do by its end.
-#[derive(Clone)]
 pub(super) struct Step<'a> {
     pub scheme: Scheme,
     pub state: &'a State,
-    pub dt: f64,
     /// Angles of speed-driven motors at the end of the step; entries of torque-driven ones are not read.
     pub motor_angles: Vec<f64>,
     /// Torques of torque-driven motors at the end of the step, N m.
     pub motor_torques: Vec<f64>,
+    /// Backward difference: rates are `rate (q - q_n) + drift`.
+    pub rate: f64,
+    pub drift: Vec<f64>,
+    pub velocity_drift: Vec<f64>,
+}
+
+impl<'a> Step<'a> {
+    /// A step of the given order, which at most is one more than there are past states.
+    pub fn new(
+        scheme: Scheme,
+        state: &'a State,
+        dt: f64,
+        order: usize,
+        (motor_angles, motor_torques): (Vec<f64>, Vec<f64>),
+    ) -> Self {
+        let past = &state.history.past;
+        let times: Vec<f64> = std::iter::once(state.time + dt).chain(state.history.times(state.time, order)).collect();
+        let weights = derivative_weights(&times);
+        let difference = |present: &[f64], part: &dyn Fn(usize) -> &'a [f64]| {
+            let mut drift = vec![0.0; present.len()];
+            for (k, weight) in weights[2..].iter().enumerate() {
+                drift.iter_mut().zip(part(k)).zip(present).for_each(|((d, old), now)| *d += weight * (old - now));
+            }
+            drift
+        };
+        Self {
+            scheme,
+            state,
+            motor_angles,
+            motor_torques,
+            rate: weights[0],
+            drift: difference(&state.q, &|k| &past[k].q),
+            velocity_drift: difference(&state.velocity, &|k| &past[k].velocity),
+        }
+    }
+
+    pub fn increment(&self) -> Increment<'_> {
+        Increment {
+            rate: self.rate,
+            previous: &self.state.q,
+            drift: &self.drift,
+            velocity: &self.state.velocity,
+            velocity_drift: &self.velocity_drift,
+        }
+    }
 }
 
 /// Size of a residual and what it is to be compared with, both N.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Size {
-    /// Largest nodal force or, divided by the mean edge length, moment.
+    /// Largest nodal force or, divided by the mean edge length, moment; velocities count with the local drag.
     pub norm: f64,
     /// Largest force that takes part in the balance.
     pub scale: f64,
@@ -51,26 +100,34 @@ pub(super) struct Size {
     pub worst: usize,
 }
 
-/// Workspace of the force balance; no step allocates.
+/// A trial solution: degrees of freedom and force density.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Unknowns {
+    pub q: Vec<f64>,
+    pub density: Vec<f64>,
+}
+
+/// Workspace of the force balance; no evaluation allocates.
 pub(super) struct Balance {
-    configuration: Configuration,
+    pub(super) configuration: Configuration,
     shafts: Vec<ShaftAngle>,
-    residual: Vec<f64>,
+    pub(super) residual: Vec<f64>,
+    /// Residual of the fluid's equation, Pa m s / m.
+    pub(super) slip: Vec<f64>,
     elastic: Vec<f64>,
-    jacobian: Vec<f64>,
-    preconditioner: Vec<f64>,
+    pub(super) jacobian: Vec<f64>,
     masked: Vec<usize>,
     diagonal: Vec<usize>,
-    lu: SparseLu,
-    gmres: Gmres,
-    dense: Option<DenseLu>,
-    fluid: Option<Box<dyn FluidModel>>,
-    fluid_dofs: Vec<usize>,
+    pub(super) ldlt: SparseLdlt,
+    pub(super) lu: SparseLu,
+    pub(super) gmres: Gmres,
+    pub(super) fluid: Option<Box<dyn FluidModel>>,
+    pub(super) fluid_dofs: Vec<usize>,
     fluid_slots: Vec<[usize; 9]>,
-    flow: Vec<f64>,
+    pub(super) flow: Vec<f64>,
+    pub(super) work: super::solve::Work,
     constant: Vec<f64>,
     contact: Vec<f64>,
-    rhs: Vec<f64>,
     pool: Option<Arc<ThreadPool>>,
 }
 
@@ -78,10 +135,12 @@ impl Balance {
     pub fn new(model: &Model, pool: Option<Arc<ThreadPool>>) -> Result<Self, LinearError> {
         let n = model.dof_count;
         let pattern = &model.pattern;
-        let fluid = model.fluid();
+        let fluid = model.fluid()?;
         let fluid_dofs: Vec<usize> = fluid.as_ref().map_or_else(Vec::new, |fluid| {
             fluid.immersed().iter().map(|&node| model.network.node_dofs()[node]).collect()
         });
+        // The Krylov method works on the fluid's equation where there is one, else on the force balance.
+        let size = if fluid.as_ref().is_some_and(|fluid| !fluid.is_local()) { 3 * fluid_dofs.len() } else { n };
         let slot =
             |row: usize, column: usize| pattern.slot(row, column).ok_or(LinearError::Singular { what: "sparse" });
         let fluid_slots = fluid_dofs
@@ -113,19 +172,19 @@ impl Balance {
             residual: vec![0.0; n],
             elastic: vec![0.0; n],
             jacobian: vec![0.0; pattern.entries()],
-            preconditioner: vec![0.0; pattern.entries()],
             masked,
             diagonal,
+            ldlt: SparseLdlt::new(pattern)?,
             lu: SparseLu::new(pattern)?,
-            gmres: Gmres::new(n, KRYLOV_LIMIT.min(n)),
-            dense: None,
+            gmres: Gmres::new(size, KRYLOV_LIMIT.min(size)),
+            work: super::solve::Work::new(n, 3 * fluid_dofs.len()),
+            slip: vec![0.0; 3 * fluid_dofs.len()],
             flow: vec![0.0; 3 * fluid_dofs.len()],
             fluid,
             fluid_dofs,
             fluid_slots,
             constant: vec![0.0; n],
             contact: vec![0.0; n],
-            rhs: vec![0.0; n],
             pool,
         })
     }
@@ -143,6 +202,12 @@ impl Balance {
     /// Degrees of freedom of the immersed nodes.
     pub fn fluid_dofs(&self) -> &[usize] {
         &self.fluid_dofs
+    }
+
+    /// A vanishing force density, of the length the scheme needs.
+    pub fn zero_density(&self, scheme: Scheme) -> Vec<f64> {
+        let nonlocal = self.fluid.as_ref().is_some_and(|fluid| !fluid.is_local() && scheme.fluid_is_implicit());
+        vec![0.0; if nonlocal { 3 * self.fluid_dofs.len() } else { 0 }]
     }
 
     /// Moves the fluid to the geometry of a state.
@@ -179,13 +244,13 @@ impl Balance {
 
     /// Each node's stiffness against displacement within the step: mass over dt squared plus own drag over dt, N/m.
     pub fn node_stiffness(&self, model: &Model, step: &Step, out: &mut Vec<f64>) {
-        let inertia = if step.scheme.has_inertia() { 1.0 / (step.dt * step.dt) } else { 0.0 };
+        let inertia = if step.scheme.has_inertia() { step.rate * step.rate } else { 0.0 };
         out.clear();
         out.extend(model.network.node_dofs().iter().map(|&dof| model.mass[dof] * inertia));
         let Some(fluid) = self.fluid.as_ref().filter(|_| step.scheme.fluid_is_implicit()) else {
             return;
         };
-        let drag = |block: &Mat3| block.trace() / (3.0 * step.dt);
+        let drag = |block: &Mat3| block.trace() * step.rate / 3.0;
         let mean = fluid.local().iter().map(drag).sum::<f64>() / fluid.local().len() as f64;
         let mut immersed = vec![false; out.len()];
         for (&node, block) in fluid.immersed().iter().zip(fluid.local()) {
@@ -196,21 +261,28 @@ impl Balance {
         out.iter_mut().zip(&immersed).filter(|(_, wet)| !**wet).for_each(|(stiffness, _)| *stiffness += mean);
     }
 
-    /// Residual at `q`; `None` if `q` is not a configuration.
-    pub fn evaluate(&mut self, model: &Model, step: &Step, q: &[f64], statistics: &mut Statistics) -> Option<Size> {
+    /// Residual at a trial; `None` if it is not a configuration.
+    pub fn evaluate(
+        &mut self,
+        model: &Model,
+        step: &Step,
+        trial: &Unknowns,
+        statistics: &mut Statistics,
+    ) -> Option<Size> {
         let start = Instant::now();
-        let size = self.residual(model, step, q);
+        let size = self.residual(model, step, trial);
         statistics.seconds_assembly += start.elapsed().as_secs_f64();
         size
     }
 
-    fn residual(&mut self, model: &Model, step: &Step, q: &[f64]) -> Option<Size> {
+    fn residual(&mut self, model: &Model, step: &Step, trial: &Unknowns) -> Option<Size> {
+        let q = &trial.q;
         self.shafts.clear();
         self.shafts.extend(model.motors.iter().zip(&step.motor_angles).map(|(motor, &angle)| motor.shaft(angle, q)));
         if !self.configuration.update(&model.network, q, &step.state.frames, &self.shafts) {
             return None;
         }
-        let increment = Increment { dt: step.dt, previous: &step.state.q, velocity: &step.state.velocity };
+        let increment = step.increment();
         self.elastic.fill(0.0);
         let mut out = Assembly { residual: &mut self.elastic, jacobian: None };
         model.stretching.add(&self.configuration, &increment, &mut out);
@@ -221,11 +293,7 @@ impl Balance {
             model.inertia.add(&self.configuration, &increment, &mut out);
         }
         model.dissipative.iter().for_each(|term| term.add(&self.configuration, &increment, &mut out));
-        if let Some(fluid) = self.fluid.as_mut().filter(|_| step.scheme.fluid_is_implicit()) {
-            gather(&self.fluid_dofs, |dof| (q[dof] - step.state.q[dof]) / step.dt, &mut self.flow);
-            fluid.resist(&mut self.flow).ok()?;
-            scatter(&self.fluid_dofs, &self.flow, &mut self.residual);
-        }
+        self.add_fluid(step, trial)?;
         for (motor, torque) in model.motors.iter().zip(&step.motor_torques) {
             if let Drive::Torque { dof, .. } = motor.drive {
                 self.residual[dof] -= torque;
@@ -234,43 +302,65 @@ impl Balance {
         for (residual, contact) in self.residual.iter_mut().zip(&self.contact) {
             *residual -= contact;
         }
+        Some(self.size(model, step)).filter(|size| size.merit.is_finite())
+    }
+
+    fn add_fluid(&mut self, step: &Step, trial: &Unknowns) -> Option<()> {
+        let Some(fluid) = self.fluid.as_mut().filter(|_| step.scheme.fluid_is_implicit()) else { return Some(()) };
+        let increment = step.increment();
+        gather(&self.fluid_dofs, |dof| increment.rate_of(dof, trial.q[dof]), &mut self.flow);
+        match fluid.nonlocal() {
+            None => fluid.resist(&mut self.flow).ok()?,
+            Some(mobility) => {
+                mobility.apply(&trial.density, &mut self.slip);
+                let scale = mobility.scale();
+                self.slip.iter_mut().zip(&self.flow).for_each(|(slip, velocity)| *slip -= scale * velocity);
+                mobility.weigh(&trial.density, &mut self.flow);
+            }
+        }
+        scatter(&self.fluid_dofs, &self.flow, &mut self.residual);
+        Some(())
+    }
+
+    fn size(&mut self, model: &Model, step: &Step) -> Size {
         let mut size = Size { norm: 0.0, scale: 0.0, merit: 0.0, worst: 0 };
-        for dof in 0..model.dof_count {
-            let weight = model.force_weight[dof];
-            let total = self.residual[dof] + self.elastic[dof];
-            size.scale = size.scale.max(self.elastic[dof].abs() * weight);
-            self.residual[dof] = if model.prescribed[dof] { 0.0 } else { total };
-            let force = self.residual[dof].abs() * weight;
+        let mut count = |force: f64, dof: usize| {
             if force > size.norm {
                 size.norm = force;
                 size.worst = dof;
             }
             size.merit += force * force;
+        };
+        let mut scale: f64 = 0.0;
+        for dof in 0..model.dof_count {
+            let weight = model.force_weight[dof];
+            let total = self.residual[dof] + self.elastic[dof];
+            scale = scale.max(self.elastic[dof].abs() * weight);
+            self.residual[dof] = if model.prescribed[dof] { 0.0 } else { total };
+            count(self.residual[dof].abs() * weight, dof);
         }
+        if let Some(drag) = self.drag_per_slip(step) {
+            for (k, slip) in self.slip.iter().enumerate() {
+                count(slip.abs() * drag, self.fluid_dofs[k / 3] + k % 3);
+            }
+            // Clamped filaments may be at rest elastically while the fluid is dragged: its forces count as well.
+            scale = self.flow.iter().fold(scale, |scale, force| scale.max(force.abs()));
+        }
+        size.scale = scale;
         size.merit = size.merit.sqrt();
-        size.merit.is_finite().then_some(size)
+        size
     }
 
-    /// Newton direction `-J^-1 r` at the configuration of the last residual.
-    pub fn direction(
-        &mut self,
-        model: &Model,
-        step: &Step,
-        tolerance: f64,
-        out: &mut [f64],
-        statistics: &mut Statistics,
-    ) -> Result<(), LinearError> {
-        let start = Instant::now();
-        self.differentiate(model, step);
-        let assembled = Instant::now();
-        statistics.seconds_assembly += (assembled - start).as_secs_f64();
-        let solved = self.solve(model, step, tolerance, out, statistics);
-        statistics.seconds_linear += assembled.elapsed().as_secs_f64();
-        solved
+    /// Turns residuals of the fluid's equation into forces: mean local resistance over `8 pi mu`.
+    pub(super) fn drag_per_slip(&mut self, step: &Step) -> Option<f64> {
+        let fluid = self.fluid.as_mut().filter(|fluid| step.scheme.fluid_is_implicit() && !fluid.is_local())?;
+        let mean = fluid.local().iter().map(Mat3::trace).sum::<f64>() / (3.0 * fluid.local().len() as f64);
+        Some(mean / fluid.nonlocal()?.scale())
     }
 
-    fn differentiate(&mut self, model: &Model, step: &Step) {
-        let increment = Increment { dt: step.dt, previous: &step.state.q, velocity: &step.state.velocity };
+    /// Derivative of the force balance at the configuration of the last residual, and the matrix that preconditions it.
+    pub(super) fn differentiate(&mut self, model: &Model, step: &Step) {
+        let increment = step.increment();
         self.jacobian.fill(0.0);
         let mut out = Assembly { residual: &mut self.elastic, jacobian: Some(&mut self.jacobian) };
         model.stretching.add(&self.configuration, &increment, &mut out);
@@ -279,59 +369,15 @@ impl Balance {
             model.inertia.add(&self.configuration, &increment, &mut out);
         }
         model.dissipative.iter().for_each(|term| term.add(&self.configuration, &increment, &mut out));
-        let local = |values: &mut [f64], fluid: &dyn FluidModel| {
+        if let Some(fluid) = self.fluid.as_deref().filter(|_| step.scheme.fluid_is_implicit()) {
             for (slots, block) in self.fluid_slots.iter().zip(fluid.local()) {
                 for (&slot, entry) in slots.iter().zip(block.as_slice()) {
-                    values[slot] += entry / step.dt;
+                    self.jacobian[slot] += entry * step.rate;
                 }
             }
-        };
-        let fluid = self.fluid.as_deref().filter(|_| step.scheme.fluid_is_implicit());
-        if let Some(fluid) = fluid.filter(|fluid| fluid.is_local()) {
-            local(&mut self.jacobian, fluid);
         }
         self.masked.iter().for_each(|&slot| self.jacobian[slot] = 0.0);
         self.diagonal.iter().for_each(|&slot| self.jacobian[slot] = 1.0);
-        self.preconditioner.copy_from_slice(&self.jacobian);
-        if let Some(fluid) = fluid.filter(|fluid| !fluid.is_local()) {
-            local(&mut self.preconditioner, fluid);
-            self.masked.iter().for_each(|&slot| self.preconditioner[slot] = 0.0);
-            self.diagonal.iter().for_each(|&slot| self.preconditioner[slot] = 1.0);
-        }
-    }
-
-    fn solve(
-        &mut self,
-        model: &Model,
-        step: &Step,
-        tolerance: f64,
-        out: &mut [f64],
-        statistics: &mut Statistics,
-    ) -> Result<(), LinearError> {
-        for ((rhs, residual), weight) in self.rhs.iter_mut().zip(&self.residual).zip(&model.force_weight) {
-            *rhs = -residual * weight;
-        }
-        let factored = self.lu.factor(&model.pattern, &self.preconditioner);
-        let Self { jacobian, lu, gmres, dense, fluid, fluid_dofs, flow, rhs, .. } = self;
-        let fluid = fluid.as_deref_mut().filter(|fluid| step.scheme.fluid_is_implicit() && !fluid.is_local());
-        let mut operator = Operator { model, jacobian, lu, fluid, fluid_dofs, flow, rate: 1.0 / step.dt };
-        let krylov = factored.and_then(|()| gmres.solve(&mut operator, rhs, out, tolerance));
-        match krylov {
-            Ok(iterations) => statistics.krylov_iterations += iterations as u64,
-            Err(_) => {
-                statistics.dense_solves += 1;
-                let dense = dense.get_or_insert_with(|| DenseLu::new(rhs.len()));
-                operator.fill(dense.matrix_mut())?;
-                dense.factor()?;
-                out.copy_from_slice(rhs);
-                dense.solve(out)?;
-            }
-        }
-        out.iter_mut()
-            .zip(&model.prescribed)
-            .filter(|(_, prescribed)| **prescribed)
-            .for_each(|(value, _)| *value = 0.0);
-        Ok(())
     }
 
     /// Elastic gradient and the values of the elastic Hessian at a state.
@@ -339,7 +385,13 @@ impl Balance {
         let shafts = model.shafts(&state.motor_angles, &state.q);
         let (mut gradient, mut hessian) = (vec![0.0; model.dof_count], vec![0.0; model.pattern.entries()]);
         if self.configuration.update(&model.network, &state.q, &state.frames, &shafts) {
-            let increment = Increment { dt: 1.0, previous: &state.q, velocity: &state.velocity };
+            let increment = Increment {
+                rate: 0.0,
+                previous: &state.q,
+                drift: &state.velocity,
+                velocity: &state.velocity,
+                velocity_drift: &state.velocity,
+            };
             let mut out = Assembly { residual: &mut gradient, jacobian: Some(&mut hessian) };
             model.stretching.add(&self.configuration, &increment, &mut out);
             model.hinges.add(&self.configuration, &increment, &mut out);
@@ -361,61 +413,14 @@ impl Balance {
     }
 }
 
-fn gather(dofs: &[usize], value: impl Fn(usize) -> f64, out: &mut [f64]) {
+pub(super) fn gather(dofs: &[usize], value: impl Fn(usize) -> f64, out: &mut [f64]) {
     for (&dof, chunk) in dofs.iter().zip(out.chunks_exact_mut(3)) {
         (0..3).for_each(|c| chunk[c] = value(dof + c));
     }
 }
 
-fn scatter(dofs: &[usize], values: &[f64], out: &mut [f64]) {
+pub(super) fn scatter(dofs: &[usize], values: &[f64], out: &mut [f64]) {
     for (&dof, chunk) in dofs.iter().zip(values.chunks_exact(3)) {
         (0..3).for_each(|c| out[dof + c] += chunk[c]);
-    }
-}
-
-/// The derivative as an operator; rows are weighted so that its residuals are forces.
-struct Operator<'a> {
-    model: &'a Model,
-    jacobian: &'a [f64],
-    lu: &'a mut SparseLu,
-    fluid: Option<&'a mut (dyn FluidModel + 'static)>,
-    fluid_dofs: &'a [usize],
-    flow: &'a mut [f64],
-    rate: f64,
-}
-
-impl Operator<'_> {
-    fn fill(&mut self, matrix: &mut [f64]) -> Result<(), LinearError> {
-        let n = self.model.dof_count;
-        let mut unit = vec![0.0; n];
-        for (column, out) in matrix.chunks_exact_mut(n).enumerate() {
-            unit[column] = 1.0;
-            self.apply(&unit, out)?;
-            unit[column] = 0.0;
-        }
-        Ok(())
-    }
-}
-
-impl LinearOperator for Operator<'_> {
-    fn apply(&mut self, x: &[f64], out: &mut [f64]) -> Result<(), LinearError> {
-        out.fill(0.0);
-        self.model.pattern.multiply_add(self.jacobian, x, out);
-        let prescribed = &self.model.prescribed;
-        if let Some(fluid) = self.fluid.as_deref_mut() {
-            let rate = self.rate;
-            gather(self.fluid_dofs, |dof| if prescribed[dof] { 0.0 } else { x[dof] * rate }, self.flow);
-            fluid.resist(self.flow)?;
-            for (&dof, chunk) in self.fluid_dofs.iter().zip(self.flow.chunks_exact(3)) {
-                (0..3).filter(|&c| !prescribed[dof + c]).for_each(|c| out[dof + c] += chunk[c]);
-            }
-        }
-        out.iter_mut().zip(&self.model.force_weight).for_each(|(value, weight)| *value *= weight);
-        Ok(())
-    }
-
-    fn precondition(&mut self, x: &mut [f64]) -> Result<(), LinearError> {
-        x.iter_mut().zip(&self.model.force_weight).for_each(|(value, weight)| *value /= weight);
-        self.lu.solve(x)
     }
 }

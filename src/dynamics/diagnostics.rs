@@ -61,6 +61,15 @@ impl Simulation {
     /// # Errors
     /// If the fluid's matrix is singular.
     pub fn force_density(&mut self) -> Result<Vec<f64>, LinearError> {
+        if !self.state.density.is_empty() {
+            let mut out = vec![0.0; 3 * self.model.network.node_count()];
+            if let Some(fluid) = self.balance.fluid_mut() {
+                for (&node, value) in fluid.immersed().iter().zip(self.state.density.chunks_exact(3)) {
+                    out[3 * node..3 * node + 3].copy_from_slice(value);
+                }
+            }
+            return Ok(out);
+        }
         self.with_fluid(|fluid, velocity| fluid.force_density(velocity))
     }
 

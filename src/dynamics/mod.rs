@@ -4,21 +4,24 @@
 //! * [`model`]: the constant part of a simulation, built once from a specification.
 //! * [`state`]: the changing part, plain data that can be saved and restored to the last bit.
 //! * [`terms`]: inertia and loads, the terms that belong to no other room.
-//! * [`balance`]: the force balance of one step: residual, derivative, linear solve.
+//! * [`balance`]: the force balance of one step: residual and derivative; [`solve`]: its linear systems.
+//! * [`control`]: the size and order of adaptive steps.
 //! * [`newton`]: Newton's method with line search on that balance.
-//! * [`predictor`]: the guess that method starts from.
+//! * [`predictor`]: past states: guesses, backward differences, dense output.
 //! * [`scheme`]: which terms a time-stepping scheme keeps and how it treats the fluid.
 //! * [`simulation`]: steps, retries, acceptance.
 //! * [`diagnostics`]: motor torques, force densities, gaps.
 //! * [`threads`]: our own thread pool, safe across forks.
 
 pub mod balance;
+pub mod control;
 pub mod diagnostics;
 pub mod model;
 pub mod newton;
 pub mod predictor;
 pub mod scheme;
 pub mod simulation;
+mod solve;
 pub mod specification;
 pub mod state;
 pub mod statistics;

@@ -1,5 +1,6 @@
 //! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
 
+use super::control::Control;
 use super::predictor::History;
 use super::specification::{FluidModelSpecification, Specification};
 use super::state::State;
@@ -205,21 +206,21 @@ impl Model {
     }
 
     /// A fresh drag model, with its own workspace.
-    pub(super) fn fluid(&self) -> Option<Box<dyn FluidModel>> {
-        let fluid = self.specification.fluid.as_ref()?;
+    pub(super) fn fluid(&self) -> Result<Option<Box<dyn FluidModel>>, LinearError> {
+        let Some(fluid) = self.specification.fluid.as_ref() else { return Ok(None) };
         let (edges, nodes) = (self.network.edges(), &self.specification.nodes);
         if !fluid.immersed.iter().any(|&immersed| immersed) {
-            return None;
+            return Ok(None);
         }
-        Some(match &fluid.model {
+        Ok(Some(match &fluid.model {
             FluidModelSpecification::ResistiveForce { coefficients } => {
                 Box::new(ResistiveForce::new(edges, &fluid.immersed, coefficients))
             }
             FluidModelSpecification::StokesletSegments { epsilon } => {
                 let local = preconditioner_drag(fluid.viscosity, &self.specification, epsilon);
-                Box::new(StokesletSegments::new(nodes, edges, &fluid.immersed, epsilon, fluid.viscosity, &local))
+                Box::new(StokesletSegments::new(nodes, edges, &fluid.immersed, epsilon, fluid.viscosity, &local)?)
             }
-        })
+        }))
     }
 }
 
@@ -344,6 +345,8 @@ fn initial_state(specification: &Specification, network: &Network, dof_count: us
         steps: 0,
         q: coordinates(network, &specification.nodes, &specification.theta, dof_count),
         velocity: vec![0.0; dof_count],
+        density: Vec::new(),
+        control: Control::default(),
         history: History::default(),
         frames: shape_frames(specification, network, &specification.nodes),
         motor_angles: vec![0.0; specification.motors.len()],

@@ -1,6 +1,6 @@
 //! Newton's method with line search on the force balance of a step.
 
-use super::balance::{Balance, Size, Step};
+use super::balance::{Balance, Size, Step, Unknowns};
 use super::model::Model;
 use super::statistics::Statistics;
 
@@ -28,21 +28,25 @@ pub(super) struct NewtonFailure {
     pub reason: String,
 }
 
-/// Relative residual of the linear systems: small enough that Newton gains as many digits an iteration.
+/// Relative residual of the linear systems: no smaller than lets Newton gain as many digits an iteration as are wanted.
 const LINEAR_TOLERANCE: f64 = 1e-6;
+/// Share of the remaining distance to the target that a linear system may leave.
+const LINEAR_SHARE: f64 = 0.1;
+/// Loosest linear system.
+const LOOSEST: f64 = 1e-2;
 /// Halvings of a step that does not reduce the residual.
 const BACKTRACKS: usize = 14;
-/// A residual this many times the round-off estimate that no longer falls is accepted as converged.
+/// A residual this many times the target that no longer falls is accepted as converged.
 const STAGNATION: f64 = 100.0;
 
-/// Solves the balance from the guess `q`, in place.
+/// Solves the balance from the guess `unknowns`, in place.
 pub(super) fn solve(
     balance: &mut Balance,
     model: &Model,
     step: &Step,
     settings: &NewtonSettings,
     work: &mut NewtonWork,
-    q: &mut [f64],
+    unknowns: &mut Unknowns,
     statistics: &mut Statistics,
 ) -> Result<(), NewtonFailure> {
     let failure = |size: Option<Size>, iterations: usize, reason: &str| NewtonFailure {
@@ -51,8 +55,8 @@ pub(super) fn solve(
         worst: size.map_or(0, |size| size.worst),
         reason: reason.to_owned(),
     };
-    let floor = round_off(model, q);
-    let Some(mut size) = balance.evaluate(model, step, q, statistics) else {
+    let floor = round_off(model, &unknowns.q);
+    let Some(mut size) = balance.evaluate(model, step, unknowns, statistics) else {
         return Err(failure(None, 0, "the guess is not a configuration"));
     };
     for iteration in 0..settings.max_iterations {
@@ -61,15 +65,15 @@ pub(super) fn solve(
             return Ok(());
         }
         statistics.newton_iterations += 1;
-        if let Err(error) = balance.direction(model, step, LINEAR_TOLERANCE, &mut work.direction, statistics) {
+        let linear = (LINEAR_SHARE * target / size.norm).clamp(LINEAR_TOLERANCE, LOOSEST);
+        let direction = (&mut work.direction.q[..], &mut work.direction.density[..]);
+        if let Err(error) = balance.direction(model, step, linear, direction, statistics) {
             return Err(failure(Some(size), iteration, &error.to_string()));
         }
         let mut length = 1.0;
         let mut accepted = None;
         for _ in 0..BACKTRACKS {
-            for ((trial, start), direction) in work.trial.iter_mut().zip(&*q).zip(&work.direction) {
-                *trial = start + length * direction;
-            }
+            work.try_length(unknowns, length);
             let trial = balance.evaluate(model, step, &work.trial, statistics);
             if let Some(trial) = trial.filter(|trial| trial.merit < (1.0 - 1e-4 * length) * size.merit) {
                 accepted = Some(trial);
@@ -80,12 +84,12 @@ pub(super) fn solve(
         let Some(next) = accepted else {
             if size.norm <= STAGNATION * target {
                 // The configuration is left at the last trial: bring it back to the accepted point.
-                let _ = balance.evaluate(model, step, q, statistics);
+                let _ = balance.evaluate(model, step, unknowns, statistics);
                 return Ok(());
             }
             return Err(failure(Some(size), iteration, "the line search found no lower residual"));
         };
-        q.copy_from_slice(&work.trial);
+        std::mem::swap(unknowns, &mut work.trial);
         size = next;
     }
     Err(failure(Some(size), settings.max_iterations, "too many iterations"))
@@ -93,13 +97,23 @@ pub(super) fn solve(
 
 /// Vectors of Newton's method.
 pub(super) struct NewtonWork {
-    direction: Vec<f64>,
-    trial: Vec<f64>,
+    direction: Unknowns,
+    trial: Unknowns,
 }
 
 impl NewtonWork {
-    pub fn new(dof_count: usize) -> Self {
-        Self { direction: vec![0.0; dof_count], trial: vec![0.0; dof_count] }
+    pub fn new(like: &Unknowns) -> Self {
+        Self { direction: like.clone(), trial: like.clone() }
+    }
+
+    fn try_length(&mut self, from: &Unknowns, length: f64) {
+        let move_along = |trial: &mut [f64], start: &[f64], direction: &[f64]| {
+            for ((trial, start), direction) in trial.iter_mut().zip(start).zip(direction) {
+                *trial = start + length * direction;
+            }
+        };
+        move_along(&mut self.trial.q, &from.q, &self.direction.q);
+        move_along(&mut self.trial.density, &from.density, &self.direction.density);
     }
 }
 

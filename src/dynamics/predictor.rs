@@ -1,56 +1,111 @@
-//! The guess Newton's method starts from: extrapolation of past states, of the order that has served best.
+//! Past states: extrapolated to the guess Newton's method starts from, differenced to rates, interpolated for output.
 
-/// Past states kept: enough for cubic extrapolation.
-const DEPTH: usize = 3;
+/// Past states kept besides the present one: extrapolation of third order and the error estimate of the order above.
+const DEPTH: usize = 4;
 
-/// States before the present one, newest first, and the order of the next extrapolation.
+/// Highest order of the guess for Newton's method.
+const GUESS_ORDER: usize = 3;
+
+/// What is remembered of an accepted state.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Sample {
+    /// Time, s.
+    pub time: f64,
+    /// Degrees of freedom.
+    pub q: Vec<f64>,
+    /// Their rates.
+    pub velocity: Vec<f64>,
+    /// Force density on the fluid at the immersed nodes, N/m; empty without nonlocal fluid.
+    pub density: Vec<f64>,
+}
+
+/// States before the present one, newest first, and the order of the next guess.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct History {
-    /// Times of the past states, s.
-    pub times: Vec<f64>,
-    /// Their degrees of freedom.
-    pub states: Vec<Vec<f64>>,
+    /// Past states.
+    pub past: Vec<Sample>,
     /// How many of them the next guess uses: 0 stands still, 1 extrapolates linearly, 2 by a parabola, 3 by a cubic.
     pub order: usize,
 }
 
+/// Weights of Lagrange interpolation at `to` through the times.
+fn interpolation_weights(times: &[f64], to: f64) -> impl Iterator<Item = f64> + '_ {
+    (0..times.len())
+        .map(move |j| (0..times.len()).filter(|&k| k != j).map(|k| (to - times[k]) / (times[j] - times[k])).product())
+}
+
+/// Weights of the derivative at `times[0]` of the polynomial through the times.
+pub fn derivative_weights(times: &[f64]) -> Vec<f64> {
+    let mut weights: Vec<f64> = (1..times.len())
+        .map(|j| {
+            let others = (1..times.len()).filter(|&k| k != j);
+            let product: f64 = others.map(|k| (times[0] - times[k]) / (times[j] - times[k])).product();
+            product / (times[j] - times[0])
+        })
+        .collect();
+    let own = -weights.iter().sum::<f64>();
+    weights.insert(0, own);
+    weights
+}
+
 impl History {
-    /// Fills `out` with the extrapolation of the given order from the present state to time `to`.
-    fn extrapolate(&self, order: usize, now: f64, q: &[f64], to: f64, out: &mut [f64]) {
-        let time = |k: usize| if k == 0 { now } else { self.times[k - 1] };
+    /// Times of the present state and of as many past ones as there are, newest first.
+    pub fn times(&self, now: f64, count: usize) -> Vec<f64> {
+        std::iter::once(now).chain(self.past.iter().map(|sample| sample.time)).take(count).collect()
+    }
+
+    /// Extrapolates (or interpolates) the given order from the present vector, of which `part` picks the past values.
+    pub fn extrapolate(
+        &self,
+        order: usize,
+        (now, present): (f64, &[f64]),
+        part: impl Fn(&Sample) -> &[f64],
+        to: f64,
+        out: &mut [f64],
+    ) {
+        let times = self.times(now, order + 1);
         out.fill(0.0);
-        for j in 0..=order {
-            let weight: f64 = (0..=order).filter(|&k| k != j).map(|k| (to - time(k)) / (time(j) - time(k))).product();
-            let state = if j == 0 { q } else { &self.states[j - 1] };
-            out.iter_mut().zip(state).for_each(|(value, sample)| *value += weight * sample);
+        for (j, weight) in interpolation_weights(&times, to).enumerate() {
+            let values = if j == 0 { present } else { part(&self.past[j - 1]) };
+            out.iter_mut().zip(values).for_each(|(value, sample)| *value += weight * sample);
         }
     }
 
-    /// Fills `out` with the guess for time `to`, given the present state.
-    pub fn predict(&self, now: f64, q: &[f64], to: f64, out: &mut [f64]) {
-        self.extrapolate(self.order.min(self.states.len()), now, q, to, out);
+    /// The order of the next guess, as far as there are states for it.
+    pub fn guess_order(&self) -> usize {
+        self.order.min(self.past.len())
     }
 
-    /// Takes in an accepted state: chooses the order that would have predicted it best, and keeps the state it replaces.
+    /// Errors `max |q - extrapolation| / weight` with which each order would have predicted an accepted state.
     ///
-    /// `force_weight` turns each residual into a force; its inverse turns each degree of freedom into a length.
-    pub fn accept(&mut self, now: f64, old: &[f64], to: f64, new: &[f64], force_weight: &[f64], work: &mut [f64]) {
-        let mut best = (f64::INFINITY, 0);
-        for order in 0..=self.states.len() {
-            self.extrapolate(order, now, old, to, work);
-            let error = (0..new.len()).map(|k| (work[k] - new[k]).abs() / force_weight[k]).fold(0.0, f64::max);
-            if error < best.0 {
-                best = (error, order);
+    /// `force_weight` turns a residual into a force; its inverse turns a degree of freedom into a length.
+    pub fn prediction_errors(
+        &self,
+        (now, old): (f64, &[f64]),
+        (to, new): (f64, &[f64]),
+        force_weight: &[f64],
+        work: &mut [f64],
+    ) -> Vec<f64> {
+        (0..=self.past.len())
+            .map(|order| {
+                self.extrapolate(order, (now, old), |sample| &sample.q, to, work);
+                (0..new.len()).map(|k| (work[k] - new[k]).abs() / force_weight[k]).fold(0.0, f64::max)
+            })
+            .collect()
+    }
+
+    /// Keeps the state that an accepted one replaces; `errors` are those of [`Self::prediction_errors`].
+    pub fn accept(&mut self, replaced: Sample, errors: &[f64]) {
+        let mut best = 0;
+        for (order, error) in errors.iter().enumerate() {
+            if *error < errors[best] {
+                best = order;
             }
         }
-        // One more past state is known now: let the order grow with it as long as the highest one wins.
-        self.order = if best.1 == self.states.len() { best.1 + 1 } else { best.1 };
-        let mut reused = if self.states.len() == DEPTH { self.states.pop() } else { None }.unwrap_or_default();
-        self.times.truncate(DEPTH - 1);
-        reused.clear();
-        reused.extend_from_slice(old);
-        self.states.insert(0, reused);
-        self.times.insert(0, now);
-        self.order = self.order.min(self.states.len());
+        // One more past state is known now: the order grows with it as long as the highest one wins.
+        let grown = if best + 1 == errors.len() { best + 1 } else { best };
+        self.past.truncate(DEPTH - 1);
+        self.past.insert(0, replaced);
+        self.order = grown.min(self.past.len()).min(GUESS_ORDER);
     }
 }

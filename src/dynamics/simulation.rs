@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::balance::{Balance, Step};
+use super::balance::{Balance, Step, Unknowns};
+use super::control::Control;
 use super::model::{Model, ModelError};
 use super::newton::{self, NewtonSettings, NewtonWork};
-use super::predictor::History;
+use super::predictor::{History, Sample};
 use super::scheme::Scheme;
 use super::specification::Specification;
 use super::state::State;
@@ -69,6 +70,10 @@ impl From<SignalError> for TryError {
     }
 }
 
+/// First adaptive step and smallest one, in steps of fixed size.
+const FIRST_STEP: f64 = 1e-2;
+const SMALLEST_STEP: f64 = 1e-9;
+
 /// How often a step may be halved.
 const HALVINGS: u32 = 12;
 
@@ -84,8 +89,9 @@ pub struct Simulation {
     contact: Option<ContactSolver>,
     statistics: Statistics,
     fluid_step: Option<u64>,
-    q: Vec<f64>,
+    trial: Unknowns,
     extrapolated: Vec<f64>,
+    tolerance: Option<f64>,
     positions: Vec<Vec3>,
     stiffness: Vec<f64>,
 }
@@ -100,9 +106,13 @@ impl Simulation {
         let pool = threads::pool(thread_count);
         let balance = Balance::new(&model, pool.as_ref().map(Arc::clone))?;
         let contact = model.contact.as_ref().map(ContactSolver::new);
+        let mut state = state;
+        state.density = balance.zero_density(scheme);
+        let trial = Unknowns { q: state.q.clone(), density: state.density.clone() };
         Ok(Self {
-            work: NewtonWork::new(model.dof_count),
-            q: state.q.clone(),
+            work: NewtonWork::new(&trial),
+            trial,
+            tolerance: None,
             extrapolated: state.q.clone(),
             positions: state.positions(&model.network),
             stiffness: Vec::new(),
@@ -175,6 +185,8 @@ impl Simulation {
         }
         state.velocity.fill(0.0);
         state.history = History::default();
+        state.density.fill(0.0);
+        state.control = Control::default();
         rebase(&mut state.frames, network.edges(), nodes);
         if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
             return Err(ModelError::Shape { shape: "nodes" });
@@ -183,12 +195,78 @@ impl Simulation {
         Ok(())
     }
 
-    /// Advances by one step of `dt`, in as many smaller ones as it takes.
+    /// Makes the local error of every step at most `tolerance` metres by choosing its size and order; `None` goes back to
+    /// steps of `dt`, first order.
+    pub fn set_tolerance(&mut self, tolerance: Option<(f64, f64)>) {
+        self.tolerance = tolerance.map(|(length, _)| length);
+        self.settings.tolerance = tolerance.map_or(NewtonSettings::default().tolerance, |(_, residual)| residual);
+    }
+
+    /// Advances by one step: of `dt`, in as many smaller ones as it takes, or of the size the tolerance asks for.
     ///
     /// # Errors
     /// [`StepError`]; the state is that of the last accepted (smaller) step.
     pub fn step(&mut self) -> Result<(), StepError> {
-        self.advance(self.dt)
+        match self.tolerance {
+            None => self.advance(self.dt),
+            Some(_) => self.adaptive_step(f64::INFINITY),
+        }
+    }
+
+    /// Makes one adaptive step, not beyond `limit`.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn adaptive_step(&mut self, limit: f64) -> Result<(), StepError> {
+        let start = Instant::now();
+        let result = self.try_adaptively(limit);
+        self.statistics.seconds_total += start.elapsed().as_secs_f64();
+        result
+    }
+
+    fn try_adaptively(&mut self, limit: f64) -> Result<(), StepError> {
+        // The first step is a small part of a fixed one: nothing is known yet of how fast things change.
+        if self.state.control.dt == 0.0 {
+            self.state.control = Control { dt: FIRST_STEP * self.dt, order: 1 };
+        }
+        let smallest = SMALLEST_STEP * self.dt;
+        loop {
+            let wanted = self.state.control;
+            let left = limit - self.state.time;
+            // Two equal steps to the limit rather than a whole one and a sliver.
+            let dt = if wanted.dt >= left {
+                left
+            } else if 2.0 * wanted.dt > left {
+                0.5 * left
+            } else {
+                wanted.dt
+            };
+            match self.try_step(dt, wanted.order) {
+                Ok(true) => {
+                    if dt < 0.999 * wanted.dt {
+                        // A step cut short by the limit says little against the wanted one.
+                        self.state.control.dt = self.state.control.dt.max(wanted.dt);
+                    }
+                    return Ok(());
+                }
+                Ok(false) => self.statistics.rejected_steps += 1,
+                Err(TryError::Signal(error)) => return Err(StepError::Signal(error)),
+                Err(TryError::Solve { residual, iterations, worst, reason }) => {
+                    self.statistics.rejected_steps += 1;
+                    if std::mem::take(&mut self.state.history.order) > 0 {
+                        continue;
+                    }
+                    self.state.control = Control { dt: 0.25 * dt, order: 1 };
+                    if self.state.control.dt < smallest {
+                        return Err(self.convergence_error(dt, residual, iterations, worst, reason));
+                    }
+                }
+            }
+            if self.state.control.dt < smallest {
+                let reason = "the step has become too small for the tolerance".to_owned();
+                return Err(self.convergence_error(dt, f64::NAN, 0, 0, reason));
+            }
+        }
     }
 
     /// Advances by the given time in one step or, where that does not converge, in several.
@@ -204,8 +282,8 @@ impl Simulation {
                 break Ok(());
             }
             let dt = part.min(left);
-            match self.try_step(dt) {
-                Ok(()) => left -= dt,
+            match self.try_step(dt, 1) {
+                Ok(_) => left -= dt,
                 Err(TryError::Signal(error)) => break Err(StepError::Signal(error)),
                 Err(TryError::Solve { residual, iterations, worst, reason }) => {
                     self.statistics.rejected_steps += 1;
@@ -238,18 +316,35 @@ impl Simulation {
         }
     }
 
-    fn try_step(&mut self, dt: f64) -> Result<(), TryError> {
+    /// Tries one step of the given length and order; whether it was accepted.
+    fn try_step(&mut self, dt: f64, order: usize) -> Result<bool, TryError> {
+        let order = order.min(self.state.history.past.len() + 1);
         let (t0, t1) = (self.state.time, self.state.time + dt);
-        let mut target = std::mem::take(&mut self.q);
-        let prepared = self.prepare(&mut target, t0, t1);
-        let solved = prepared.and_then(|step| self.solve(step, &mut target));
-        self.q = target;
-        self.accept(solved?, dt);
-        Ok(())
+        let mut trial = std::mem::take(&mut self.trial);
+        let prepared = self.prepare(&mut trial, t0, t1);
+        let solved = prepared.and_then(|motors| self.solve(motors, dt, order, &mut trial));
+        self.trial = trial;
+        let angles = solved?;
+        let missed = self.state.history.prediction_errors(
+            (t0, &self.state.q),
+            (t1, &self.trial.q),
+            &self.model.force_weight,
+            &mut self.extrapolated,
+        );
+        let mut accepted = true;
+        if let Some(tolerance) = self.tolerance {
+            let times = self.state.history.times(t0, usize::MAX);
+            let control = Control { dt, order };
+            (self.state.control, accepted) = control.judge(&times, t1, &missed, tolerance);
+        }
+        if accepted {
+            self.accept(angles, dt, order, &missed);
+        }
+        Ok(accepted)
     }
 
-    /// Motor angles and torques at the end of the step; the prescribed degrees of freedom of `target` are set to it.
-    fn prepare(&self, target: &mut [f64], t0: f64, t1: f64) -> Result<(Vec<f64>, Vec<f64>, f64), TryError> {
+    /// Motor angles and torques at the end of the step; the guess, with the prescribed degrees of freedom set.
+    fn prepare(&self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<(Vec<f64>, Vec<f64>), TryError> {
         let mut angles = self.state.motor_angles.clone();
         let mut torques = vec![0.0; angles.len()];
         for (k, motor) in self.model.motors.iter().enumerate() {
@@ -258,32 +353,52 @@ impl Simulation {
                 Drive::Torque { signal, .. } => torques[k] = signal.value(t1)?,
             }
         }
-        self.state.history.predict(t0, &self.state.q, t1, target);
+        let state = &self.state;
+        let order = state.history.guess_order();
+        state.history.extrapolate(order, (t0, &state.q), |sample| &sample.q, t1, &mut guess.q);
+        state.history.extrapolate(order, (t0, &state.density), |sample| &sample.density, t1, &mut guess.density);
+        let target = &mut guess.q;
         for clamp in &self.model.clamps {
             for &dof in &clamp.nodes {
-                (0..3).for_each(|c| target[dof + c] = self.state.q[dof + c] + (t1 - t0) * clamp.velocity[c]);
+                (0..3).for_each(|c| target[dof + c] = state.q[dof + c] + (t1 - t0) * clamp.velocity[c]);
             }
             if !clamp.edges.is_empty() {
                 let turn = clamp.angular_velocity.integral(t0, t1)?;
-                clamp.edges.iter().for_each(|&dof| target[dof] = self.state.q[dof] + turn);
+                clamp.edges.iter().for_each(|&dof| target[dof] = state.q[dof] + turn);
             }
         }
-        Ok((angles, torques, t1 - t0))
+        Ok((angles, torques))
     }
 
-    fn solve(&mut self, (angles, torques, dt): (Vec<f64>, Vec<f64>, f64), q: &mut [f64]) -> Result<Vec<f64>, TryError> {
+    /// Solves the step from the guess, contact included; the motor angles at its end.
+    fn solve(
+        &mut self,
+        motors: (Vec<f64>, Vec<f64>),
+        dt: f64,
+        order: usize,
+        trial: &mut Unknowns,
+    ) -> Result<Vec<f64>, TryError> {
         let Self { model, state, balance, scheme, settings, work, contact, statistics, positions, stiffness, .. } =
             self;
-        if self.fluid_step != Some(state.steps) {
-            positions
-                .iter_mut()
-                .zip(model.network.node_dofs())
-                .for_each(|(x, &dof)| *x = crate::rod::configuration::node(&state.q, dof));
+        let dofs = model.network.node_dofs();
+        let place = |q: &[f64], positions: &mut [Vec3]| {
+            positions.iter_mut().zip(dofs).for_each(|(x, &dof)| *x = crate::rod::configuration::node(q, dof));
+        };
+        if order > 1 {
+            // A higher order needs the fluid's geometry at the end of the step: that of the extrapolation will do.
+            let now = (state.time, &state.q[..]);
+            let reach = state.history.past.len().min(order);
+            state.history.extrapolate(reach, now, |sample| &sample.q, state.time + dt, &mut self.extrapolated);
+            place(&self.extrapolated, positions);
+            self.fluid_step = None;
+            balance.place_fluid(positions, statistics)?;
+        } else if self.fluid_step != Some(state.steps) {
+            place(&state.q, positions);
             self.fluid_step = None;
             balance.place_fluid(positions, statistics)?;
             self.fluid_step = Some(state.steps);
         }
-        let step = Step { scheme: *scheme, state, dt, motor_angles: angles, motor_torques: torques };
+        let step = Step::new(*scheme, state, dt, order, motors);
         balance.begin(&step)?;
         let failed = |failure: newton::NewtonFailure| TryError::Solve {
             residual: failure.residual,
@@ -292,12 +407,8 @@ impl Simulation {
             reason: failure.reason,
         };
         let (Some(law), Some(contact)) = (&model.contact, contact) else {
-            newton::solve(balance, model, &step, settings, work, q, statistics).map_err(failed)?;
+            newton::solve(balance, model, &step, settings, work, trial, statistics).map_err(failed)?;
             return Ok(step.motor_angles);
-        };
-        let dofs = model.network.node_dofs();
-        let place = |q: &[f64], positions: &mut [Vec3]| {
-            positions.iter_mut().zip(dofs).for_each(|(x, &dof)| *x = crate::rod::configuration::node(q, dof));
         };
         contact.begin(&state.contacts);
         balance.node_stiffness(model, &step, stiffness);
@@ -305,8 +416,8 @@ impl Simulation {
         let mut violation = f64::INFINITY;
         for _ in 0..law.max_iterations() {
             balance.set_contact(|add| contact.spread(law, positions, add), dofs);
-            newton::solve(balance, model, &step, settings, work, q, statistics).map_err(failed)?;
-            place(q, positions);
+            newton::solve(balance, model, &step, settings, work, trial, statistics).map_err(failed)?;
+            place(&trial.q, positions);
             let start = Instant::now();
             let loaded = !contact.forces().is_empty();
             let pass = contact.pass(law, positions, stiffness);
@@ -325,14 +436,20 @@ impl Simulation {
         })
     }
 
-    fn accept(&mut self, angles: Vec<f64>, dt: f64) {
+    fn accept(&mut self, angles: Vec<f64>, dt: f64, order: usize, missed: &[f64]) {
+        let motors = (Vec::new(), Vec::new());
+        let step = Step::new(self.scheme, &self.state, dt, order, motors);
+        let increment = step.increment();
+        let velocity: Vec<f64> =
+            self.trial.q.iter().enumerate().map(|(dof, &value)| increment.rate_of(dof, value)).collect();
         let state = &mut self.state;
-        for ((velocity, new), old) in state.velocity.iter_mut().zip(&self.q).zip(&state.q) {
-            *velocity = (new - old) / dt;
-        }
-        let work = &mut self.extrapolated;
-        state.history.accept(state.time, &state.q, state.time + dt, &self.q, &self.model.force_weight, work);
-        std::mem::swap(&mut state.q, &mut self.q);
+        let replaced = Sample {
+            time: state.time,
+            q: std::mem::replace(&mut state.q, self.trial.q.clone()),
+            velocity: std::mem::replace(&mut state.velocity, velocity),
+            density: std::mem::replace(&mut state.density, self.trial.density.clone()),
+        };
+        state.history.accept(replaced, missed);
         self.balance.configuration().accept(&mut state.frames);
         state.time += dt;
         state.steps += 1;
@@ -344,6 +461,29 @@ impl Simulation {
             state.contacts.extend_from_slice(contact.forces());
         }
         self.statistics.steps += 1;
+    }
+
+    /// The state at a time within the last step, interpolated to the order of the past states.
+    ///
+    /// Frames are transported from those of the present state, so that material frames are continuous. Contact forces are
+    /// those of the present state.
+    ///
+    /// # Errors
+    /// [`StepError::Signal`] if a motor's function of time fails.
+    pub fn state_at(&self, time: f64) -> Result<State, StepError> {
+        let mut state = self.state.clone();
+        let order = state.history.past.len().min(state.control.order + 1);
+        let now = self.state.time;
+        self.state.history.extrapolate(order, (now, &self.state.q), |s| &s.q, time, &mut state.q);
+        self.state.history.extrapolate(order, (now, &self.state.velocity), |s| &s.velocity, time, &mut state.velocity);
+        self.state.history.extrapolate(order, (now, &self.state.density), |s| &s.density, time, &mut state.density);
+        for (k, motor) in self.model.motors.iter().enumerate() {
+            if let Drive::Speed(signal) = &motor.drive {
+                state.motor_angles[k] -= signal.integral(time, now).map_err(StepError::Signal)?;
+            }
+        }
+        state.time = time;
+        Ok(state)
     }
 }
 

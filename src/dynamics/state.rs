@@ -1,5 +1,6 @@
 //! The changing part of a simulation: plain data, copied and restored to the last bit.
 
+use super::control::Control;
 use super::predictor::History;
 use crate::Vec3;
 use crate::rod::configuration::{ReferenceFrames, node};
@@ -16,6 +17,10 @@ pub struct State {
     pub q: Vec<f64>,
     /// Their rates over the last step.
     pub velocity: Vec<f64>,
+    /// Force density on the fluid at the immersed nodes, N/m; empty unless the fluid is nonlocal and implicit.
+    pub density: Vec<f64>,
+    /// Size and order of the next adaptive step.
+    pub control: Control,
     /// States before this one, for the next guess.
     pub history: History,
     /// Reference frames of this state.

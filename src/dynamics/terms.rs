@@ -4,7 +4,8 @@ use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{Assembly, Element, Increment, Term};
 use crate::rod::configuration::Configuration;
 
-/// Lumped inertia, implicit: `M (q - q_n - dt v_n) / dt^2` (equation 9).
+/// Lumped inertia, implicit: mass times the backward difference of rates, `M (q - q_n - dt v_n) / dt^2` at first
+/// order (equation 9).
 pub struct Inertia {
     mass: Vec<f64>,
     elements: Vec<Element>,
@@ -32,11 +33,10 @@ impl Term for Inertia {
     }
 
     fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
-        let dt = increment.dt;
         for (dof, (&mass, element)) in self.mass.iter().zip(&self.elements).enumerate() {
-            let ahead = configuration.q()[dof] - increment.previous[dof] - dt * increment.velocity[dof];
-            let rate = mass / (dt * dt);
-            element.add(&[rate * ahead], Some(&[rate]), out);
+            let gain = increment.rate_of(dof, configuration.q()[dof]) - increment.velocity[dof];
+            let acceleration = increment.rate * gain + increment.velocity_drift[dof];
+            element.add(&[mass * acceleration], Some(&[mass * increment.rate * increment.rate]), out);
         }
     }
 }

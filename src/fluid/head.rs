@@ -24,21 +24,18 @@ impl Head {
     }
 
     fn add_drag(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
-        let rate = self.translation / increment.dt;
-        let dof = self.drag.dofs[0];
-        let force = (node(configuration.q(), dof) - node(increment.previous, dof)) * rate;
-        let matrix = Mat3::identity() * rate;
+        let force = rate_of_node(configuration, increment, self.drag.dofs[0]) * self.translation;
+        let matrix = Mat3::identity() * (self.translation * increment.rate);
         self.drag.add(force.as_slice(), Some(matrix.as_slice()), out);
     }
 
     fn add_couple(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
         let (before, after) = (self.couple.dofs[0], self.couple.dofs[3]);
-        let across = |q: &[f64]| -> Vec3 { node(q, after) - node(q, before) };
-        let span = across(configuration.q());
-        let velocity = (span - across(increment.previous)) / increment.dt;
+        let span = node(configuration.q(), after) - node(configuration.q(), before);
+        let velocity = rate_of_node(configuration, increment, after) - rate_of_node(configuration, increment, before);
         let strength = self.rotation / span.norm_squared();
         let force = velocity * strength;
-        let block = Mat3::identity() * (strength / increment.dt)
+        let block = Mat3::identity() * (strength * increment.rate)
             - velocity * span.transpose() * (2.0 * strength / span.norm_squared());
         let residual = [-force.x, -force.y, -force.z, force.x, force.y, force.z];
         let mut matrix = [0.0; 36];
@@ -53,6 +50,10 @@ impl Head {
         }
         self.couple.add(&residual, Some(&matrix), out);
     }
+}
+
+fn rate_of_node(configuration: &Configuration, increment: &Increment, dof: usize) -> Vec3 {
+    Vec3::from_fn(|c, _| increment.rate_of(dof + c, configuration.q()[dof + c]))
 }
 
 impl Term for Head {

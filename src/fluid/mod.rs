@@ -48,8 +48,30 @@ pub trait FluidModel: Send + Sync {
     /// Resistance of every immersed node on its own, N s/m: the whole model if it is local, else a preconditioner.
     fn local(&self) -> &[Mat3];
 
+    /// The model in mobility form, if it is not local.
+    fn nonlocal(&mut self) -> Option<&mut (dyn Mobility + 'static)>;
+
     /// Whether [`Self::local`] is the whole model.
     fn is_local(&self) -> bool;
+}
+
+/// A nonlocal model in mobility form: velocities follow from nodal force densities `f` by `8 pi mu u = A f`, nodal
+/// forces by `W f`.
+pub trait Mobility: Send + Sync {
+    /// `8 pi mu`, Pa s.
+    fn scale(&self) -> f64;
+
+    /// `out = A f`.
+    fn apply(&self, density: &[f64], out: &mut [f64]);
+
+    /// `out = W f`.
+    fn weigh(&self, density: &[f64], out: &mut [f64]);
+
+    /// `f <- W^-1 f`.
+    ///
+    /// # Errors
+    /// If `W` is singular: an edge without length.
+    fn unweigh(&mut self, force: &mut [f64]) -> Result<(), LinearError>;
 }
 
 /// Ascending nodes of the immersed edges, and these edges in that numbering.

@@ -1,6 +1,6 @@
 //! Resistive force theory: each edge feels only its own motion, with one coefficient along and one across it.
 
-use super::{FluidModel, immersed_part};
+use super::{FluidModel, Mobility, immersed_part};
 use crate::linear::LinearError;
 use crate::{Mat3, Vec3};
 
@@ -71,6 +71,10 @@ impl FluidModel for ResistiveForce {
 
     fn local(&self) -> &[Mat3] {
         &self.blocks
+    }
+
+    fn nonlocal(&mut self) -> Option<&mut (dyn Mobility + 'static)> {
+        None
     }
 
     fn is_local(&self) -> bool {

@@ -1,13 +1,16 @@
-//! Nonlocal drag by regularized Stokeslet segments: `Res = 8 pi mu W A^-1` (equations 12 to 14).
+//! Nonlocal drag by regularized Stokeslet segments: `8 pi mu u = A f`, forces `W f` (equations 12 to 14).
 //!
-//! `A` maps nodal force densities to nodal velocities by collocation and is not symmetric, so it is factored by LU; `W`
-//! holds the integrals of products of hat functions, so that total force and torque are exact (docs/theory, "Fluid").
+//! `A` maps nodal force densities to nodal velocities by collocation and is not symmetric, so where its inverse is needed
+//! (the explicit scheme, resistance matrices) it is factored by LU; `W` holds the integrals of products of hat functions,
+//! so that total force and torque are exact (docs/theory, "Fluid").
 
 use super::rft::ResistiveForce;
 use super::stokeslet::{HatWeights, mobility};
-use super::{FluidModel, immersed_part};
+use super::{FluidModel, Mobility, immersed_part};
 use crate::linear::LinearError;
-use crate::linear::dense::DenseLu;
+use crate::linear::dense::{DenseLu, multiply};
+use crate::linear::ldlt::SparseLdlt;
+use crate::linear::pattern::Pattern;
 use crate::{Mat3, Vec3};
 
 /// Regularized Stokeslet segments on the immersed edges.
@@ -17,8 +20,11 @@ pub struct StokesletSegments {
     epsilon: Vec<f64>,
     viscosity: f64,
     positions: Vec<Vec3>,
+    matrix: Vec<f64>,
     lu: DenseLu,
+    factored: bool,
     weights: HatWeights,
+    gram: Gram,
     scratch: Vec<f64>,
     local: ResistiveForce,
 }
@@ -26,6 +32,9 @@ pub struct StokesletSegments {
 impl StokesletSegments {
     /// `epsilon` is the regularization of every edge of the network, m; `local` are drag coefficients along and across,
     /// used for preconditioning only.
+    ///
+    /// # Errors
+    /// If the pattern of `W` cannot be analysed.
     pub fn new(
         nodes: &[Vec3],
         edges: &[[usize; 2]],
@@ -33,12 +42,15 @@ impl StokesletSegments {
         epsilon: &[f64],
         viscosity: f64,
         local: &[[f64; 2]],
-    ) -> Self {
+    ) -> Result<Self, LinearError> {
         let (own, own_edges, chosen) = immersed_part(edges, immersed);
         let positions: Vec<Vec3> = own.iter().map(|&node| nodes[node]).collect();
-        Self {
+        Ok(Self {
+            matrix: vec![0.0; 9 * own.len() * own.len()],
             lu: DenseLu::new(3 * own.len()),
+            factored: false,
             weights: HatWeights::new(&positions, &own_edges),
+            gram: Gram::new(own.len(), &own_edges)?,
             scratch: vec![0.0; 3 * own.len()],
             epsilon: chosen.iter().map(|&edge| epsilon[edge]).collect(),
             local: ResistiveForce::new(edges, immersed, local),
@@ -46,7 +58,16 @@ impl StokesletSegments {
             edges: own_edges,
             viscosity,
             positions,
+        })
+    }
+
+    fn factor(&mut self) -> Result<(), LinearError> {
+        if !self.factored {
+            self.lu.matrix_mut().copy_from_slice(&self.matrix);
+            self.lu.factor()?;
+            self.factored = true;
         }
+        Ok(())
     }
 }
 
@@ -63,9 +84,10 @@ impl FluidModel for StokesletSegments {
         for (position, &node) in self.positions.iter_mut().zip(&self.nodes) {
             *position = nodes[node];
         }
-        mobility(&self.positions, &self.positions, &self.edges, &self.epsilon, self.lu.matrix_mut(), pool);
-        self.lu.factor()?;
+        mobility(&self.positions, &self.positions, &self.edges, &self.epsilon, &mut self.matrix, pool);
+        self.factored = false;
         self.weights.update(&self.positions);
+        self.gram.update(&self.positions, &self.edges)?;
         self.local.update(nodes, pool)
     }
 
@@ -77,7 +99,8 @@ impl FluidModel for StokesletSegments {
     }
 
     fn force_density(&mut self, velocity: &mut [f64]) -> Result<(), LinearError> {
-        let scale = 8.0 * std::f64::consts::PI * self.viscosity;
+        self.factor()?;
+        let scale = self.scale();
         velocity.iter_mut().for_each(|component| *component *= scale);
         self.lu.solve(velocity)
     }
@@ -86,7 +109,77 @@ impl FluidModel for StokesletSegments {
         self.local.local()
     }
 
+    fn nonlocal(&mut self) -> Option<&mut (dyn Mobility + 'static)> {
+        Some(self)
+    }
+
     fn is_local(&self) -> bool {
         false
+    }
+}
+
+impl Mobility for StokesletSegments {
+    fn scale(&self) -> f64 {
+        8.0 * std::f64::consts::PI * self.viscosity
+    }
+
+    fn apply(&self, density: &[f64], out: &mut [f64]) {
+        multiply(&self.matrix, density, out);
+    }
+
+    fn weigh(&self, density: &[f64], out: &mut [f64]) {
+        self.weights.apply(density, out);
+    }
+
+    fn unweigh(&mut self, force: &mut [f64]) -> Result<(), LinearError> {
+        self.gram.solve(force)
+    }
+}
+
+/// The Gram matrix `W` of the hat functions, factored.
+struct Gram {
+    pattern: Pattern,
+    slots: Vec<[usize; 4]>,
+    values: Vec<f64>,
+    ldlt: SparseLdlt,
+    column: Vec<f64>,
+}
+
+impl Gram {
+    fn new(nodes: usize, edges: &[[usize; 2]]) -> Result<Self, LinearError> {
+        let pattern = Pattern::from_stencils(nodes, edges.iter().map(|edge| edge.as_slice()));
+        let slot = |row, column| pattern.slot(row, column).ok_or(LinearError::Singular { what: "hat-function" });
+        let slots = edges
+            .iter()
+            .map(|&[i, j]| Ok([slot(i, i)?, slot(j, j)?, slot(i, j)?, slot(j, i)?]))
+            .collect::<Result<_, LinearError>>()?;
+        Ok(Self {
+            slots,
+            values: vec![0.0; pattern.entries()],
+            ldlt: SparseLdlt::new(&pattern)?,
+            column: vec![0.0; nodes],
+            pattern,
+        })
+    }
+
+    fn update(&mut self, positions: &[Vec3], edges: &[[usize; 2]]) -> Result<(), LinearError> {
+        self.values.fill(0.0);
+        for (&[i, j], &[ii, jj, ij, ji]) in edges.iter().zip(&self.slots) {
+            let sixth = (positions[j] - positions[i]).norm() / 6.0;
+            self.values[ii] += 2.0 * sixth;
+            self.values[jj] += 2.0 * sixth;
+            self.values[ij] += sixth;
+            self.values[ji] += sixth;
+        }
+        self.ldlt.factor(&self.pattern, &self.values)
+    }
+
+    fn solve(&mut self, vectors: &mut [f64]) -> Result<(), LinearError> {
+        for c in 0..3 {
+            self.column.iter_mut().enumerate().for_each(|(node, value)| *value = vectors[3 * node + c]);
+            self.ldlt.solve(&mut self.column)?;
+            self.column.iter().enumerate().for_each(|(node, value)| vectors[3 * node + c] = *value);
+        }
+        Ok(())
     }
 }

@@ -45,8 +45,8 @@ impl Term for TwistDrag {
         for ((&edge, &coefficient), element) in self.edges.iter().zip(&self.coefficients).zip(&self.elements) {
             // Frames transported in time do not spin, so the material's spin in a step is the change of its angle.
             let dof = element.dofs[3];
-            let rate = coefficient / increment.dt;
-            let torque = rate * (configuration.q()[dof] - increment.previous[dof]);
+            let rate = coefficient * increment.rate;
+            let torque = coefficient * increment.rate_of(dof, configuration.q()[dof]);
             // A torque about the tangent does work on the holonomy of the frame too; without its share on the nodes the total
             // torque would balance to second order in the step only.
             let spin = configuration.holonomy(edge).gradient;

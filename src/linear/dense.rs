@@ -90,3 +90,16 @@ impl DenseLu {
         if x.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(LinearError::Singular { what: "dense" }) }
     }
 }
+
+/// `out = A x` for a dense column-major matrix.
+pub fn multiply(matrix: &[f64], x: &[f64], out: &mut [f64]) {
+    let (rows, columns) = (out.len(), x.len());
+    faer::linalg::matmul::matmul(
+        MatMut::from_column_major_slice_mut(out, rows, 1),
+        faer::Accum::Replace,
+        MatRef::from_column_major_slice(matrix, rows, columns),
+        MatRef::from_column_major_slice(x, columns, 1),
+        1.0,
+        Par::Seq,
+    );
+}

@@ -7,6 +7,7 @@
 
 pub mod dense;
 pub mod krylov;
+pub mod ldlt;
 pub mod pattern;
 pub mod sparse;
 

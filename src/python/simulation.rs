@@ -2,14 +2,15 @@
 
 use std::time::{Duration, Instant};
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
-use crate::dynamics::predictor::History;
+use crate::dynamics::control::Control;
+use crate::dynamics::predictor::{History, Sample};
 use crate::dynamics::scheme::Scheme;
 use crate::dynamics::simulation as core;
 use crate::dynamics::state::State;
@@ -70,6 +71,38 @@ impl Simulation {
             }
             Ok(())
         })
+    }
+
+    /// Local error (m) that adaptive steps keep to, and the relative residual they are solved to; fixed steps without.
+    #[pyo3(signature = (tolerance=None))]
+    fn set_tolerance(&mut self, tolerance: Option<(f64, f64)>) {
+        self.inner.set_tolerance(tolerance);
+    }
+
+    /// Makes adaptive steps until `time` is reached or passed, none beyond `limit`.
+    fn advance_past(&mut self, py: Python<'_>, time: f64, limit: f64) -> PyResult<()> {
+        let inner = &mut self.inner;
+        let mut looked = Instant::now();
+        py.detach(|| {
+            while inner.state().time < time {
+                inner.adaptive_step(limit).map_err(|error| Python::attach(|py| step_error(py, error)))?;
+                if looked.elapsed() > SIGNAL_INTERVAL {
+                    looked = Instant::now();
+                    Python::attach(|py| py.check_signals())?;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// The frame at a time within the last step, interpolated.
+    fn frame_at<'py>(&mut self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyDict>> {
+        let present = self.inner.state().clone();
+        let then = self.inner.state_at(time).map_err(|error| step_error(py, error))?;
+        self.inner.restore(then);
+        let frame = self.frame(py);
+        self.inner.restore(present);
+        frame
     }
 
     /// Advances by `duration` seconds in one step.
@@ -247,8 +280,18 @@ impl Simulation {
         out.set_item("steps", PyArray1::from_slice(py, &[state.steps]))?;
         out.set_item("q", PyArray1::from_slice(py, &state.q))?;
         out.set_item("velocity", PyArray1::from_slice(py, &state.velocity))?;
-        out.set_item("history_times", PyArray1::from_slice(py, &state.history.times))?;
-        out.set_item("history_states", from_flat(py, state.history.states.concat(), state.q.len())?)?;
+        let past = &state.history.past;
+        let rows = |part: fn(&Sample) -> &Vec<f64>, width: usize| {
+            PyArray1::from_vec(py, past.iter().flat_map(part).copied().collect::<Vec<f64>>())
+                .reshape([past.len(), width])
+        };
+        out.set_item("density", PyArray1::from_slice(py, &state.density))?;
+        out.set_item("control_step", PyArray1::from_slice(py, &[state.control.dt]))?;
+        out.set_item("control_order", PyArray1::from_slice(py, &[state.control.order as u64]))?;
+        out.set_item("history_times", PyArray1::from_iter(py, past.iter().map(|sample| sample.time)))?;
+        out.set_item("history_states", rows(|sample| &sample.q, state.q.len())?)?;
+        out.set_item("history_velocities", rows(|sample| &sample.velocity, state.q.len())?)?;
+        out.set_item("history_densities", rows(|sample| &sample.density, state.density.len())?)?;
         out.set_item("history_order", PyArray1::from_slice(py, &[state.history.order as u64]))?;
         out.set_item("tangents", from_points(py, &state.frames.tangents)?)?;
         out.set_item("directors", from_points(py, &state.frames.directors)?)?;
@@ -267,11 +310,9 @@ impl Simulation {
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
             q: values(&saved.q),
             velocity: values(&saved.velocity),
-            history: History {
-                times: values(&saved.history_times),
-                states: saved.history_states.as_array().rows().into_iter().map(|row| row.to_vec()).collect(),
-                order: saved.history_order.as_array().first().copied().unwrap_or(0) as usize,
-            },
+            density: values(&saved.density),
+            control: Control { dt: first(&saved.control_step), order: whole(&saved.control_order) },
+            history: History { past: past(&saved), order: whole(&saved.history_order) },
             frames: ReferenceFrames {
                 tangents: points(py, "tangents", &saved.tangents)?,
                 directors: points(py, "directors", &saved.directors)?,
@@ -286,8 +327,10 @@ impl Simulation {
             && state.frames.directors.len() == current.frames.directors.len()
             && state.frames.twists.len() == current.frames.twists.len()
             && state.motor_angles.len() == current.motor_angles.len()
-            && state.history.times.len() == state.history.states.len()
-            && state.history.states.iter().all(|past| past.len() == current.q.len());
+            && state.density.len() == current.density.len()
+            && saved.history_states.shape() == [state.history.past.len(), current.q.len()]
+            && saved.history_velocities.shape() == [state.history.past.len(), current.q.len()]
+            && saved.history_densities.shape() == [state.history.past.len(), current.density.len()];
         let finite = state.time.is_finite() && state.q.iter().chain(&state.velocity).all(|value| value.is_finite());
         if !(same && finite) {
             return Err(scene_error(py, "state", "the saved state", "a finite state of the same scene"));
@@ -305,8 +348,13 @@ struct StateInput<'py> {
     steps: PyReadonlyArray1<'py, u64>,
     q: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
+    density: PyReadonlyArray1<'py, f64>,
+    control_step: PyReadonlyArray1<'py, f64>,
+    control_order: PyReadonlyArray1<'py, u64>,
     history_times: PyReadonlyArray1<'py, f64>,
     history_states: PyReadonlyArray2<'py, f64>,
+    history_velocities: PyReadonlyArray2<'py, f64>,
+    history_densities: PyReadonlyArray2<'py, f64>,
     history_order: PyReadonlyArray1<'py, u64>,
     tangents: PyReadonlyArray2<'py, f64>,
     directors: PyReadonlyArray2<'py, f64>,
@@ -318,6 +366,29 @@ struct StateInput<'py> {
 
 fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
     array.as_array().first().copied().unwrap_or(f64::NAN)
+}
+
+fn whole(array: &PyReadonlyArray1<'_, u64>) -> usize {
+    array.as_array().first().map_or(0, |&value| value as usize)
+}
+
+fn past(saved: &StateInput<'_>) -> Vec<Sample> {
+    let (states, velocities) = (saved.history_states.as_array(), saved.history_velocities.as_array());
+    let densities = saved.history_densities.as_array();
+    saved
+        .history_times
+        .as_array()
+        .iter()
+        .zip(states.rows())
+        .zip(velocities.rows())
+        .zip(densities.rows())
+        .map(|(((&time, q), velocity), density)| Sample {
+            time,
+            q: q.to_vec(),
+            velocity: velocity.to_vec(),
+            density: density.to_vec(),
+        })
+        .collect()
 }
 
 fn contacts(saved: &StateInput<'_>) -> Vec<([u32; 2], f64)> {

@@ -6,15 +6,30 @@ use super::strain::{EDGE_F, Gradient8, Hessian8, THETA_E, THETA_F};
 use crate::Vec3;
 use crate::linear::pattern::{ElementSlots, Pattern};
 
-/// The step a residual belongs to: dissipative and inertial terms need it, elastic ones do not.
+/// How rates follow from the degrees of freedom at the end of a step; elastic terms do not need it.
+///
+/// A backward difference formula makes them `rate (q - previous) + drift`: backward Euler has `rate = 1/dt` and no
+/// drift.
 #[derive(Debug, Clone, Copy)]
 pub struct Increment<'a> {
-    /// Length of the step, s.
-    pub dt: f64,
-    /// Degrees of freedom at its beginning.
+    /// Derivative of every rate with respect to its degree of freedom, 1/s.
+    pub rate: f64,
+    /// Degrees of freedom at the beginning of the step.
     pub previous: &'a [f64],
-    /// Rates of the degrees of freedom at its beginning, 1/s times their unit.
+    /// Rates at the end of the step were the degrees of freedom those of its beginning.
+    pub drift: &'a [f64],
+    /// Rates at the beginning of the step.
     pub velocity: &'a [f64],
+    /// What `drift` is to the degrees of freedom, to their rates.
+    pub velocity_drift: &'a [f64],
+}
+
+impl Increment<'_> {
+    /// Rate of a degree of freedom whose value at the end of the step is `value`.
+    #[inline]
+    pub fn rate_of(&self, dof: usize, value: f64) -> f64 {
+        self.rate * (value - self.previous[dof]) + self.drift[dof]
+    }
 }
 
 /// Where a term adds its share: the residual (energy gradient minus forces) and, if wanted, its derivative on the model's pattern.
