@@ -8,8 +8,9 @@ import numpy as np
 
 from flagrs import _flagrs
 from flagrs.errors import SceneError
-from flagrs.scene.shapes import number, whole
+from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
+from flagrs.threads import thread_count
 
 __all__ = ["hat_weights", "mobility", "velocity"]
 
@@ -57,7 +58,7 @@ def mobility(
     """
     points, pairs, widths = _segments(nodes, edges, epsilon)
     at = points if targets is None else _vectors("targets", targets)
-    return _flagrs.mobility(points, pairs, widths, at, _threads(threads))
+    return _flagrs.mobility(points, pairs, widths, at, thread_count(threads))
 
 
 def velocity(
@@ -106,7 +107,7 @@ def velocity(
         raise _wrong("force_density", f"shape {density.shape}", f"of shape {sources.shape}")
     mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
-    return _flagrs.velocity(at, sources, pairs, density, mu, widths, _threads(threads))
+    return _flagrs.velocity(at, sources, pairs, density, mu, widths, thread_count(threads))
 
 
 def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:
@@ -120,10 +121,6 @@ def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:
     if density.shape != points.shape:
         raise _wrong("force_density", f"shape {density.shape}", f"of shape {points.shape}")
     return _flagrs.hat_weights(points, pairs, density)
-
-
-def _threads(asked: int | None) -> int:
-    return _flagrs.thread_count(None if asked is None else whole("threads", asked))
 
 
 def _wrong(field: str, value: Any, allowed: str) -> SceneError:

@@ -19,6 +19,7 @@ from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
 from flagrs.scene.shapes import number, whole
 from flagrs.scene.values import Bounds, FloatArray, IntArray
+from flagrs.threads import thread_count
 from flagrs.time_step import (
     LOCAL_SHARE,
     RESIDUAL_SHARE,
@@ -51,9 +52,9 @@ class Simulation:
         Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit
         for the explicit scheme.
     rtol
-        Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error of
-        node positions, relative to the size of the filaments (`flagrs.time_step.size`). None: steps of `dt`, first
-        order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
+        Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
+        of node positions, relative to the size of the filaments (`flagrs.time_step.size`). None: steps of
+        `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all. Results do not depend on it.
 
@@ -95,12 +96,10 @@ class Simulation:
                 value=rtol,
                 allowed="None with the explicit scheme",
             )
-        if threads is not None:
-            whole("threads", threads)
         step = default_step(scene) if dt is None else number("dt", dt, Bounds("s", above=0.0))
         _check_scheme(scene, scheme)
         self._scene = scene
-        self._native = _flagrs.Simulation(native_scene(scene), scheme, step, _flagrs.thread_count(threads))
+        self._native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
         self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
         self._restored: Path | None = None
         if rtol is not None:

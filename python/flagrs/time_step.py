@@ -25,8 +25,8 @@ RESIDUAL_SHARE = 0.05
 def size(scene: Scene) -> float:
     """Return the length that relative errors refer to [m].
 
-    The largest over the rods of the root mean square distance of the rest shape from its principal axis, the helix
-    radius of a flagellum; for rods straighter than that, a twentieth of the length.
+    The largest over the rods of the root mean square distance of the rest shape from its principal axis, the
+    helix radius of a flagellum; for rods straighter than that, a twentieth of the length.
     """
     return max(_size_of(rod) for rod in scene.rods)
 

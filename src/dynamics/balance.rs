@@ -225,12 +225,10 @@ impl Balance {
     pub fn begin(&mut self, step: &Step) -> Result<(), LinearError> {
         self.contact.fill(0.0);
         self.constant.fill(0.0);
-        if !step.scheme.fluid_is_implicit() {
-            if let Some(fluid) = &mut self.fluid {
-                gather(&self.fluid_dofs, |dof| step.state.velocity[dof], &mut self.flow);
-                fluid.resist(&mut self.flow)?;
-                scatter(&self.fluid_dofs, &self.flow, &mut self.constant);
-            }
+        if let Some(fluid) = self.fluid.as_mut().filter(|_| !step.scheme.fluid_is_implicit()) {
+            gather(&self.fluid_dofs, |dof| step.state.velocity[dof], &mut self.flow);
+            fluid.resist(&mut self.flow)?;
+            scatter(&self.fluid_dofs, &self.flow, &mut self.constant);
         }
         Ok(())
     }
