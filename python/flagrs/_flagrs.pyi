@@ -1,5 +1,5 @@
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
@@ -7,8 +7,19 @@ import numpy.typing as npt
 _Floats = npt.NDArray[np.float64]
 _Ints = npt.NDArray[np.int64]
 
+__all__ = [
+    "Simulation",
+    "__version__",
+    "hat_weights",
+    "mobility",
+    "segment_distance",
+    "thread_count",
+    "velocity",
+]
+
 __version__: str
 
+@final
 class Simulation:
     dt: float
     def __new__(cls, scene: Mapping[str, Any], scheme: str, dt: float, threads: int) -> Simulation: ...

@@ -106,9 +106,11 @@ pub struct ContactSolver {
 }
 
 /// Factors by which the gain grows while passes converge slowly and shrinks when one has made things worse. A node's own
-/// resistance overstates how far it yields in a long step, so that plain passes (gain 1) converge, but slowly.
+/// resistance overstates how far it yields in a long step, so that plain passes (gain 1) converge, but slowly; many pairs
+/// on the same nodes push together, so that less than a plain pass may be needed.
 const GAIN_GROWTH: f64 = 1.6;
 const GAIN_SHRINKAGE: f64 = 0.4;
+const SMALLEST_GAIN: f64 = 1.0 / 16.0;
 
 impl ContactSolver {
     /// A loop for scenes under this law.
@@ -141,11 +143,19 @@ impl ContactSolver {
         let candidates = self.broad_phase.candidates(nodes, &law.radius, margin);
         self.updated.clear();
         let mut violation: f64 = 0.0;
-        let mut old = self.forces.iter().peekable();
-        for &pair in candidates {
-            // Both lists ascend. A pair that has left the candidates is a margin apart and pushes no longer.
-            while old.next_if(|(other, _)| *other < pair).is_some() {}
-            let force = old.next_if(|(other, _)| *other == pair).map_or(0.0, |(_, force)| *force);
+        // Both lists ascend. A loaded pair that has been thrown out of the candidates is measured all the same: its gap is a
+        // violation that its force must answer for.
+        let mut old = self.forces.iter().copied().peekable();
+        let mut near = candidates.iter().copied().peekable();
+        loop {
+            let pair = match (old.peek(), near.peek()) {
+                (Some(&(loaded, _)), Some(&candidate)) => loaded.min(candidate),
+                (Some(&(loaded, _)), None) => loaded,
+                (None, Some(&candidate)) => candidate,
+                (None, None) => break,
+            };
+            near.next_if_eq(&pair);
+            let force = old.next_if(|(loaded, _)| *loaded == pair).map_or(0.0, |(_, force)| force);
             let [a, b] = pair.map(|edge| edge as usize);
             let sum = law.radius[a] + law.radius[b];
             let closest = law.closest([a, b], nodes);
@@ -166,7 +176,7 @@ impl ContactSolver {
         }
         std::mem::swap(&mut self.forces, &mut self.updated);
         if violation > self.last_violation {
-            self.gain = (self.gain * GAIN_SHRINKAGE).max(1.0);
+            self.gain = (self.gain * GAIN_SHRINKAGE).max(SMALLEST_GAIN);
         } else if violation > 0.5 * self.last_violation {
             self.gain *= GAIN_GROWTH;
         }

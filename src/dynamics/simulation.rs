@@ -70,6 +70,9 @@ impl From<SignalError> for TryError {
     }
 }
 
+/// Residual to which the force balance is solved between passes of the contact loop.
+const ROUGH_TOLERANCE: f64 = 1e-4;
+
 /// First adaptive step and smallest one, in steps of fixed size.
 const FIRST_STEP: f64 = 1e-2;
 const SMALLEST_STEP: f64 = 1e-9;
@@ -414,9 +417,13 @@ impl Simulation {
         balance.node_stiffness(model, &step, stiffness);
         place(&state.q, positions);
         let mut violation = f64::INFINITY;
+        let rough = NewtonSettings { tolerance: settings.tolerance.max(ROUGH_TOLERANCE), ..*settings };
+        // While contact forces are being found, the balance between passes need not be solved to the last digit.
+        let mut settled = contact.forces().is_empty();
         for _ in 0..law.max_iterations() {
             balance.set_contact(|add| contact.spread(law, positions, add), dofs);
-            newton::solve(balance, model, &step, settings, work, trial, statistics).map_err(failed)?;
+            let wanted = if settled { *settings } else { rough };
+            newton::solve(balance, model, &step, &wanted, work, trial, statistics).map_err(failed)?;
             place(&trial.q, positions);
             let start = Instant::now();
             let loaded = !contact.forces().is_empty();
@@ -424,9 +431,10 @@ impl Simulation {
             statistics.seconds_contact += start.elapsed().as_secs_f64();
             statistics.contact_iterations += u64::from(loaded || pass.pushing > 0);
             violation = pass.violation;
-            if violation <= law.tolerance() {
+            if violation <= law.tolerance() && settled {
                 return Ok(step.motor_angles);
             }
+            settled = violation <= law.tolerance();
         }
         Err(TryError::Solve {
             residual: f64::NAN,

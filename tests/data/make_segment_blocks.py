@@ -114,7 +114,27 @@ def cases():
     """Yields (label, target, start, end, epsilon); all numbers are doubles and taken as exact."""
     rng = random.Random(20240607)
     epsilons = [1e-6, 1e-4, 1e-2, 0.3, 1.0, 10.0]
-    distances = [1e-6, 1e-3, 0.1, 0.5, 0.9, 1.0, 1.3, 1.6, 2.2, 3.5, 5.0, 9.0, 22.0, 50.0, 1e2, 1e3, 1e4, 1e5, 1e6]
+    distances = [
+        1e-6,
+        1e-3,
+        0.1,
+        0.5,
+        0.9,
+        1.0,
+        1.3,
+        1.6,
+        2.2,
+        3.5,
+        5.0,
+        9.0,
+        22.0,
+        50.0,
+        1e2,
+        1e3,
+        1e4,
+        1e5,
+        1e6,
+    ]
 
     def segment(scale=1.0, shift=10.0, axis=None):
         """A segment of length about `scale`, `shift` lengths from the origin; unless `axis` is set, askew."""
@@ -136,11 +156,13 @@ def cases():
         for epsilon in (epsilons[n % 6], epsilons[(n + 2 + n // 9) % 6]):
             start, end, u = segment()
             v = across(u)
-            target = [a + distance * (math.cos(angle) * b + math.sin(angle) * c) for a, b, c in zip(start, u, v)]
+            target = [
+                a + distance * (math.cos(angle) * b + math.sin(angle) * c) for a, b, c in zip(start, u, v)
+            ]
             yield "angle", target, start, end, epsilon
 
     # Exactly on the axis, in binary: every coordinate below is a short binary fraction.
-    for t in (-64.0, -3.0, -1.5, -0.5, -2.0**-20, 0.25, 0.5, 1.0 + 2.0**-20, 1.5, 2.0, 3.5, 12.0, 1e6):
+    for t in (-64.0, -3.0, -1.5, -0.5, -(2.0**-20), 0.25, 0.5, 1.0 + 2.0**-20, 1.5, 2.0, 3.5, 12.0, 1e6):
         for epsilon in (1e-6, 1e-3, 0.125, 4.0):
             start, step = [8.0, -4.0, 2.5], [0.5, 0.75, -0.25]
             end = [a + b for a, b in zip(start, step)]
@@ -162,7 +184,13 @@ def cases():
                 start, end, u = segment()
                 v, near_end = across(u), rng.random() < 0.5
                 base, sign = (end, 1.0) if near_end else (start, -1.0)
-                yield "tip", [a + sign * gap * b + off * c for a, b, c in zip(base, u, v)], start, end, epsilon
+                yield (
+                    "tip",
+                    [a + sign * gap * b + off * c for a, b, c in zip(base, u, v)],
+                    start,
+                    end,
+                    epsilon,
+                )
 
     # Anywhere, in any size from micrometres to kilometres, at the origin or away from it.
     for n in range(140):
@@ -181,7 +209,9 @@ def main():
             size = max(fabs(c) for c in check)
             worst = max(worst, max(fabs(a - b) for a, b in zip(block, check)) / size)
         if worst > mpf("1e-30"):
-            raise SystemExit(f"quadrature and closed form differ by {nstr(worst, 3)} at {label} {target} {start} {end} {epsilon}")
+            raise SystemExit(
+                f"quadrature and closed form differ by {nstr(worst, 3)} at {label} {target} {start} {end} {epsilon}"
+            )
         inputs = [repr(c) for c in (*target, *start, *end, epsilon)]
         rows.append([label, *inputs, *(nstr(c, 25) for block in blocks for c in block)])
     header = ["case"] + [f"{v}_{c}" for v in ("target", "start", "end") for c in "xyz"] + ["epsilon"]

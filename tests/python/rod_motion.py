@@ -94,8 +94,8 @@ def linear_limit(simulation: Simulation) -> float:
 def disturbance_grows(scene: Scene, dt: float, steps: int = 2000) -> bool:
     """Return whether a disturbance of 1e-7 m becomes faster in an explicit run.
 
-    It is followed while it is small, up to 1e-4 m/s. No step may be made in parts: shorter ones are stable and
-    would cut the disturbance down.
+    It is followed while it is small, up to 1e-4 m/s. No step may be made in parts: shorter ones are stable
+    and would cut the disturbance down.
     """
     simulation = Simulation(scene, scheme="explicit", dt=dt, threads=1)
     noise = np.random.default_rng(1).normal(size=simulation.nodes.shape)
