@@ -72,7 +72,7 @@ def by_quadrature(target, start, end, epsilon):
     perp, u, length, h2, z0, z1 = frame(target, start, end, epsilon)
     h = sqrt(h2)
     v0, v1 = asinh(z0 / h), asinh(z1 / h)
-    panels = max(1, int(math.ceil(v1 - v0)))
+    panels = max(1, math.ceil(v1 - v0))
     half = (v1 - v0) / (2 * panels)
     sums = [[mpf(0)] * 4, [mpf(0)] * 4]
     for panel in range(panels):
@@ -193,7 +193,7 @@ def cases():
                 )
 
     # Anywhere, in any size from micrometres to kilometres, at the origin or away from it.
-    for n in range(140):
+    for _ in range(140):
         scale = 10.0 ** rng.uniform(-6, 3)
         start, end, u = segment(scale, rng.choice([0.0, 1.0, 10.0]))
         away, distance = unit(rng), scale * 10.0 ** rng.uniform(-3, 6)
