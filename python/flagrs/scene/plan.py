@@ -162,8 +162,9 @@ def _conditioning(rod: int, ratio: FloatArray) -> list[str]:
     condition = 10.0 * math.exp(min(math.pi / least, 300.0))
     return [
         f"rods[{rod}]: {short} immersed edges are shorter than {SHORT_EDGE:g} times the regularization "
-        f"(down to {least:.2g} of it): the fluid matrix has a condition number of about {condition:.0e} and "
-        f"the force density oscillates; use edges of at least {CURED_EDGE:g} epsilon, or a smaller epsilon"
+        f"(down to {least:.2g} of it): the fluid matrix is ill-conditioned (condition number about "
+        f"{condition:.0e}) and the force density oscillates; use edges of at least {CURED_EDGE:g} epsilon, "
+        "or a smaller epsilon"
     ]
 
 
