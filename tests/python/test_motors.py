@@ -80,7 +80,7 @@ def test_the_shaft_of_a_loaded_motor_stays_bent_alike_while_it_turns_a_thousand_
     while simulation.state()["motor_angles"][0] < angle + 1000 * TURN:
         simulation.step(7)
         farthest = max(farthest, np.abs(simulation.nodes[-1] - tip).max())
-    # A joint without the correction would give way twice a turn. Newton's tolerance is 1e-10 of the forces.
+    # A joint without the correction would give way once a turn. Newton's tolerance is 1e-10 of the forces.
     assert farthest < 1e-9 * LENGTH
 
 
