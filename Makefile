@@ -101,7 +101,9 @@ validation: $(VENV)/equipped
 
 bench: $(VENV)/equipped
 	cargo bench --locked
-	set -e; for script in kernels steps; do $(BIN)/python benches/python/$$script.py; done
+	set -e; for script in cargo_results kernels steps speed_against_error; do \
+		$(BIN)/python benches/python/$$script.py --document docs/performance.md; \
+	done
 
 wheel: | $(BIN)/python
 	rm -rf dist

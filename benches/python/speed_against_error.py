@@ -1,9 +1,9 @@
 """Wall time against error on four named problems: scheme x step or error asked for, edge length, fluid model.
 
-Run ``python benches/python/speed_against_error.py [--document docs/performance.md]``. Errors are the largest distance
-of a node from the reference at any frame, relative to the size of the filaments; the reference is an adaptive run at
-1e-7, and its own error is how far it moves when asked for 1e-6. Meshes and fluids are compared by what is measured of
-a robot and a flagellum, speed and torque, because their nodes differ.
+Run ``python benches/python/speed_against_error.py [--document docs/performance.md]``. Errors are the largest
+distance of a node from the reference at any frame, relative to the size of the filaments; the reference is an
+adaptive run at 1e-7, and its own error is how far it moves when asked for 1e-6. Meshes and fluids are compared by
+speed, head rate and torque of the robot, because their nodes differ.
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ def robot_measures(**options: Any) -> tuple[float, float, float]:
 
 
 def mesh_and_fluid() -> str:
-    """Return what mesh, regularization and fluid model are worth on the robot, beside the error of time steps."""
+    """Return what mesh, regularization and fluid model are worth on the robot."""
     cases: dict[str, dict[str, Any]] = {
         f"edges of {1e3 * edge:g} mm": {"edge_length": edge} for edge in (9e-3, 7e-3, 5e-3, 3.5e-3, 2.5e-3)
     }
@@ -181,7 +181,8 @@ def mesh_and_fluid() -> str:
         for name, (speed, rate, torque) in measured.items()
     ]
     head = ("robot at 20 rpm", "speed [mm/s]", "head [rad/s]", "torque [uN m]", "speed", "head", "torque")
-    return f"{table(head, rows)}\n\nThe last three columns are relative to edges of 2.5 mm; models are compared at 5 mm."
+    note = "The last three columns are relative to edges of 2.5 mm; models are compared at 5 mm."
+    return f"{table(head, rows)}\n\n{note}"
 
 
 def draw(studies: Mapping[str, tuple[list[Result], float]]) -> None:

@@ -14,7 +14,7 @@ import scipy.sparse
 
 from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
-from flagrs.errors import SceneError
+from flagrs.errors import SceneError, not_allowed
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
 from flagrs.scene.shapes import number, whole
@@ -30,8 +30,14 @@ from flagrs.time_step import (
 )
 from flagrs.trajectory import Trajectory
 
+#: Schemes in time; see docs/theory/time.md.
+SCHEMES = ("overdamped", "implicit", "explicit")
+
 #: Where runs are saved when no path is given.
 RUNS_FOLDER = Path("flagrs-runs")
+
+#: More steps than any run makes; larger numbers do not fit the native counter.
+MOST_STEPS = 2**62
 
 #: Frames between checkpoints.
 CHECKPOINT_FRAMES = 20
@@ -210,7 +216,7 @@ class Simulation:
         SceneError
             If n is not a whole number, at least 0, or a motor's function gives anything but a finite number.
         """
-        self._native.step(whole("n", n, least=0))
+        self._native.step(min(whole("n", n, least=0), MOST_STEPS))
 
     def run(
         self,
@@ -361,6 +367,9 @@ class Simulation:
         SceneError
             If it does not belong to this scene, or is not finite.
         """
+        missing = self._native.state().keys() - state.keys()
+        if missing:
+            raise not_allowed("state", f"without {', '.join(sorted(missing))}", "what state() returned")
         self._native.load_state(state)
 
     def checkpoint(self, path: str | Path) -> None:
@@ -385,7 +394,9 @@ def _array(field: str, value: Any, dimensions: int) -> FloatArray:
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        array = np.zeros(0)
+        raise not_allowed(field, value, f"numbers in {dimensions} dimensions") from None
+    if np.iscomplexobj(value):
+        raise not_allowed(field, value, "real numbers")
     if array.ndim != dimensions:
         raise SceneError(
             f"{field}: shape {np.shape(value)} is not allowed; must have {dimensions} dimensions",
@@ -397,6 +408,8 @@ def _array(field: str, value: Any, dimensions: int) -> FloatArray:
 
 
 def _check_scheme(scene: Scene, scheme: str) -> None:
+    if scheme not in SCHEMES:
+        raise not_allowed("scheme", scheme, f"one of {', '.join(SCHEMES)}")
     if scheme != "overdamped":
         return
     wet = scene.fluid is not None and scene.fluid.model != "none"

@@ -18,8 +18,8 @@ STABLE_SHARE = 0.2
 
 #: Local error of a step, and relative residual of its equations, over the relative error asked for (measured:
 #: docs/performance.md, "rtol holds").
-LOCAL_SHARE = 0.1
-RESIDUAL_SHARE = 0.05
+LOCAL_SHARE = 0.2
+RESIDUAL_SHARE = 0.5
 
 
 def size(scene: Scene) -> float:

@@ -92,7 +92,7 @@ impl<'a> Step<'a> {
 pub(super) struct Size {
     /// Largest nodal force or, divided by the mean edge length, moment; velocities count with the local drag.
     pub norm: f64,
-    /// Largest force that takes part in the balance.
+    /// Largest force other than elastic ones: they balance these, and may be far too large in a guess.
     pub scale: f64,
     /// Root of the sum of squares, for the line search.
     pub merit: f64,
@@ -259,6 +259,16 @@ impl Balance {
         out.iter_mut().zip(&immersed).filter(|(_, wet)| !**wet).for_each(|(stiffness, _)| *stiffness += mean);
     }
 
+    /// Largest force per displacement that inertia and drag exert within the step, N/m.
+    pub fn largest_stiffness(&self, model: &Model, step: &Step) -> f64 {
+        let positions = model.network.node_dofs().iter().map(|&dof| model.mass[dof]);
+        let mass = positions.fold(0.0, f64::max);
+        let inertia = if step.scheme.has_inertia() { mass * step.rate * step.rate } else { 0.0 };
+        let implicit = self.fluid.as_ref().filter(|_| step.scheme.fluid_is_implicit());
+        let drag = implicit.map_or(0.0, |fluid| fluid.local().iter().map(Mat3::trace).fold(0.0, f64::max) / 3.0);
+        inertia + drag * step.rate
+    }
+
     /// Residual at a trial; `None` if it is not a configuration.
     pub fn evaluate(
         &mut self,
@@ -333,7 +343,7 @@ impl Balance {
         for dof in 0..model.dof_count {
             let weight = model.force_weight[dof];
             let total = self.residual[dof] + self.elastic[dof];
-            scale = scale.max(self.elastic[dof].abs() * weight);
+            scale = scale.max(self.residual[dof].abs() * weight);
             self.residual[dof] = if model.prescribed[dof] { 0.0 } else { total };
             count(self.residual[dof].abs() * weight, dof);
         }
@@ -341,8 +351,6 @@ impl Balance {
             for (k, slip) in self.slip.iter().enumerate() {
                 count(slip.abs() * drag, self.fluid_dofs[k / 3] + k % 3);
             }
-            // Clamped filaments may be at rest elastically while the fluid is dragged: its forces count as well.
-            scale = self.flow.iter().fold(scale, |scale, force| scale.max(force.abs()));
         }
         size.scale = scale;
         size.merit = size.merit.sqrt();

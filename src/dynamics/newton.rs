@@ -55,12 +55,13 @@ pub(super) fn solve(
         worst: size.map_or(0, |size| size.worst),
         reason: reason.to_owned(),
     };
-    let floor = round_off(model, &unknowns.q);
+    let floor = round_off(balance, model, step, &unknowns.q);
     let Some(mut size) = balance.evaluate(model, step, unknowns, statistics) else {
         return Err(failure(None, 0, "the guess is not a configuration"));
     };
+    let target = |size: &Size| (settings.tolerance * size.scale.max(1e-8 * model.bending_scale)).max(floor);
     for iteration in 0..settings.max_iterations {
-        let target = (settings.tolerance * size.scale.max(1e-8 * model.bending_scale)).max(floor);
+        let target = target(&size);
         if size.norm <= target {
             return Ok(());
         }
@@ -92,6 +93,9 @@ pub(super) fn solve(
         std::mem::swap(unknowns, &mut work.trial);
         size = next;
     }
+    if size.norm <= STAGNATION * target(&size) {
+        return Ok(());
+    }
     Err(failure(Some(size), settings.max_iterations, "too many iterations"))
 }
 
@@ -117,13 +121,15 @@ impl NewtonWork {
     }
 }
 
-/// Round-off of a nodal force: positions are exact to `u |x|`, strains to `u |x| / l`, tensions to EA times that.
-fn round_off(model: &Model, q: &[f64]) -> f64 {
+/// Round-off of a nodal force: positions are exact to `u |x|`, strains to `u |x| / l`, tensions to EA times that; inertia
+/// and drag multiply differences of positions by masses and resistances over powers of the step.
+fn round_off(balance: &Balance, model: &Model, step: &Step, q: &[f64]) -> f64 {
     let farthest = model
         .network
         .node_dofs()
         .iter()
         .flat_map(|&dof| q[dof..dof + 3].iter())
         .fold(0.0, |far: f64, x| far.max(x.abs()));
-    2.0 * f64::EPSILON * model.stretching_scale * (1.0 + farthest / model.shortest_edge)
+    let tension = model.stretching_scale * (1.0 + farthest / model.shortest_edge);
+    2.0 * f64::EPSILON * (tension + balance.largest_stiffness(model, step) * farthest)
 }

@@ -331,8 +331,21 @@ impl Simulation {
             && saved.history_states.shape() == [state.history.past.len(), current.q.len()]
             && saved.history_velocities.shape() == [state.history.past.len(), current.q.len()]
             && saved.history_densities.shape() == [state.history.past.len(), current.density.len()];
-        let finite = state.time.is_finite() && state.q.iter().chain(&state.velocity).all(|value| value.is_finite());
-        if !(same && finite) {
+        let edges = self.inner.model().network().edges().len();
+        let pairs = saved.contact_pairs.as_array();
+        let known = pairs.ncols() == 2
+            && pairs.nrows() == saved.contact_forces.as_array().len()
+            && pairs.iter().all(|&edge| usize::try_from(edge).is_ok_and(|edge| edge < edges));
+        let past = state.history.past.iter();
+        let finite = [&state.q, &state.velocity, &state.density, &state.frames.twists, &state.motor_angles]
+            .into_iter()
+            .chain(past.flat_map(|sample| [&sample.q, &sample.velocity, &sample.density]))
+            .flatten()
+            .chain(state.contacts.iter().map(|(_, force)| force))
+            .chain(state.history.past.iter().map(|sample| &sample.time))
+            .chain([&state.time, &state.control.dt])
+            .all(|value| value.is_finite());
+        if !(same && known && finite) {
             return Err(scene_error(py, "state", "the saved state", "a finite state of the same scene"));
         }
         self.inner.restore(state);
