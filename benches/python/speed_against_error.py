@@ -2,8 +2,8 @@
 
 Run ``python benches/python/speed_against_error.py [--document docs/performance.md]``. Errors are the largest
 distance of a node from the reference at any frame, relative to the size of the filaments; the reference is an
-adaptive run at 1e-7, and its own error is how far it moves when asked for 1e-6. Meshes and fluids are compared by
-speed, head rate and torque of the robot, because their nodes differ.
+adaptive run at 1e-7, and its own error is how far it moves when asked for 1e-6. Meshes and fluids are told
+apart by speed, head rate and torque of the robot, because their nodes differ.
 """
 
 from __future__ import annotations

@@ -52,6 +52,7 @@ def run(
     save_every: Annotated[float, typer.Option(help="Simulated time between frames [s].")] = 0.1,
     scheme: Annotated[str, typer.Option(help="Scheme in time.")] = "overdamped",
     dt: Annotated[float | None, typer.Option(help="Time step [s].")] = None,
+    rtol: Annotated[float | None, typer.Option(help="Relative error of adaptive steps.")] = None,
     threads: Annotated[int | None, typer.Option(help="Threads; else FLAGRS_THREADS.")] = None,
     changes: Annotated[
         list[str] | None,
@@ -67,7 +68,9 @@ def run(
         typer.echo(described.plan())
         return
     path = output or Path(f"{described.name}.h5")
-    settings = RunSettings(until=until, save_every=save_every, scheme=scheme, dt=dt, threads=threads)
+    settings = RunSettings(
+        until=until, save_every=save_every, scheme=scheme, dt=dt, rtol=rtol, threads=threads
+    )
     for warning in described.plan().warnings:
         typer.echo(f"warning: {warning}", err=True)
     with ProgressBar(until, described.name, hidden=not sys.stderr.isatty()) as progress:
@@ -94,6 +97,9 @@ def study(
     ] = None,
     duration: Annotated[float, typer.Option(help="Simulated time of each run [s].")] = 100.0,
     dt: Annotated[float | None, typer.Option(help="Time step [s].")] = None,
+    rtol: Annotated[
+        float | None, typer.Option(help="Relative error of adaptive steps; 1e-3 unless --dt is given.")
+    ] = None,
     scheme: Annotated[str, typer.Option(help="Scheme in time.")] = "overdamped",
     processes: Annotated[
         int | None, typer.Option(help="Worker processes; by default one per processor.")
@@ -103,8 +109,14 @@ def study(
     from flagrs import study as studies  # the other commands do without
 
     carry_out = studies.convergence if which == "convergence" else studies.geometries
+    adaptive = dt is None and scheme != "explicit"
     result = carry_out(
-        directory or Path("flagrs-runs") / which, duration=duration, dt=dt, scheme=scheme, processes=processes
+        directory or Path("flagrs-runs") / which,
+        duration=duration,
+        rtol=1e-3 if rtol is None and adaptive else rtol,
+        dt=dt,
+        scheme=scheme,
+        processes=processes,
     )
     _print_rows(result.rows)
     typer.echo(f"{len(result.rows)} runs in {result.wall_seconds:.1f} s: {result.table}, {result.figure}")

@@ -49,6 +49,7 @@ def convergence(
     edge_lengths: Sequence[float] = EDGE_LENGTHS,
     duration: float = 100.0,
     save_every: float = 0.1,
+    rtol: float | None = 1e-3,
     dt: float | None = None,
     scheme: str = "overdamped",
     processes: int | None = None,
@@ -68,14 +69,15 @@ def convergence(
         Simulated time of each run [s].
     save_every
         Simulated time between frames [s].
-    dt, scheme
-        Time step [s] and scheme; see `flagrs.Simulation`.
+    rtol, dt, scheme
+        Relative error of adaptive steps (None: fixed ones), time step [s] and scheme; see
+        `flagrs.Simulation`.
     processes
         Number of worker processes; by default one for each processor.
     progress
         Whether to show a progress bar.
     """
-    settings = RunSettings(until=duration, save_every=save_every, dt=dt, scheme=scheme)
+    settings = RunSettings(until=duration, save_every=save_every, rtol=rtol, dt=dt, scheme=scheme)
     cases = [
         _robot_case(settings, rpm=rpm, edge_length=edge_length)
         for edge_length in edge_lengths
@@ -91,6 +93,7 @@ def geometries(
     pitches: Sequence[float] = PITCHES,
     duration: float = 100.0,
     save_every: float = 0.1,
+    rtol: float | None = 1e-3,
     dt: float | None = None,
     scheme: str = "overdamped",
     processes: int | None = None,
@@ -110,14 +113,15 @@ def geometries(
         Simulated time of each run [s].
     save_every
         Simulated time between frames [s].
-    dt, scheme
-        Time step [s] and scheme; see `flagrs.Simulation`.
+    rtol, dt, scheme
+        Relative error of adaptive steps (None: fixed ones), time step [s] and scheme; see
+        `flagrs.Simulation`.
     processes
         Number of worker processes; by default one for each processor.
     progress
         Whether to show a progress bar.
     """
-    settings = RunSettings(until=duration, save_every=save_every, dt=dt, scheme=scheme)
+    settings = RunSettings(until=duration, save_every=save_every, rtol=rtol, dt=dt, scheme=scheme)
     cases = [_robot_case(settings, rpm=rpm, normalized_pitch=pitch) for pitch in pitches for rpm in rpms]
     return _carry_out(
         cases, Path(directory), "geometries", "normalized_pitch", "pitch / R = {:g}", processes, progress
