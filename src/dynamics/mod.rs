@@ -4,6 +4,7 @@
 //! * [`model`]: the constant part of a simulation, built once from a specification.
 //! * [`state`]: the changing part, plain data that can be saved and restored to the last bit.
 //! * [`terms`]: inertia and loads, the terms that belong to no other room.
+//! * [`adaptive`]: steps of adaptive size and order, and output between them.
 //! * [`balance`]: the force balance of one step: residual and derivative; [`solve`]: its linear systems.
 //! * [`control`]: the size and order of adaptive steps.
 //! * [`newton`]: Newton's method with line search on that balance.
@@ -13,6 +14,7 @@
 //! * [`diagnostics`]: motor torques, force densities, gaps.
 //! * [`threads`]: our own thread pool, safe across forks.
 
+pub mod adaptive;
 pub mod balance;
 pub mod control;
 pub mod diagnostics;

@@ -53,7 +53,7 @@ pub enum StepError {
 }
 
 /// Why one try at a step failed.
-enum TryError {
+pub(super) enum TryError {
     Signal(SignalError),
     Solve { residual: f64, iterations: usize, worst: usize, reason: String },
 }
@@ -73,10 +73,6 @@ impl From<SignalError> for TryError {
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
 
-/// First adaptive step and smallest one, in steps of fixed size.
-const FIRST_STEP: f64 = 1e-2;
-const SMALLEST_STEP: f64 = 1e-9;
-
 /// How often a step may be halved.
 const HALVINGS: u32 = 12;
 
@@ -85,16 +81,16 @@ pub struct Simulation {
     pub(super) model: Model,
     pub(super) state: State,
     pub(super) balance: Balance,
-    scheme: Scheme,
-    dt: f64,
-    settings: NewtonSettings,
+    pub(super) scheme: Scheme,
+    pub(super) dt: f64,
+    pub(super) settings: NewtonSettings,
     work: NewtonWork,
     contact: Option<ContactSolver>,
-    statistics: Statistics,
+    pub(super) statistics: Statistics,
     fluid_step: Option<u64>,
     trial: Unknowns,
     extrapolated: Vec<f64>,
-    tolerance: Option<f64>,
+    pub(super) tolerance: Option<f64>,
     positions: Vec<Vec3>,
     stiffness: Vec<f64>,
 }
@@ -198,13 +194,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// Makes the local error of every step at most `tolerance` metres by choosing its size and order; `None` goes back to
-    /// steps of `dt`, first order.
-    pub fn set_tolerance(&mut self, tolerance: Option<(f64, f64)>) {
-        self.tolerance = tolerance.map(|(length, _)| length);
-        self.settings.tolerance = tolerance.map_or(NewtonSettings::default().tolerance, |(_, residual)| residual);
-    }
-
     /// Advances by one step: of `dt`, in as many smaller ones as it takes, or of the size the tolerance asks for.
     ///
     /// # Errors
@@ -213,62 +202,6 @@ impl Simulation {
         match self.tolerance {
             None => self.advance(self.dt),
             Some(_) => self.adaptive_step(f64::INFINITY),
-        }
-    }
-
-    /// Makes one adaptive step, not beyond `limit`.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub fn adaptive_step(&mut self, limit: f64) -> Result<(), StepError> {
-        let start = Instant::now();
-        let result = self.try_adaptively(limit);
-        self.statistics.seconds_total += start.elapsed().as_secs_f64();
-        result
-    }
-
-    fn try_adaptively(&mut self, limit: f64) -> Result<(), StepError> {
-        // The first step is a small part of a fixed one: nothing is known yet of how fast things change.
-        if self.state.control.dt == 0.0 {
-            self.state.control = Control { dt: FIRST_STEP * self.dt, order: 1 };
-        }
-        let smallest = SMALLEST_STEP * self.dt;
-        loop {
-            let wanted = self.state.control;
-            let left = limit - self.state.time;
-            // Two equal steps to the limit rather than a whole one and a sliver.
-            let dt = if wanted.dt >= left {
-                left
-            } else if 2.0 * wanted.dt > left {
-                0.5 * left
-            } else {
-                wanted.dt
-            };
-            match self.try_step(dt, wanted.order) {
-                Ok(true) => {
-                    if dt < 0.999 * wanted.dt {
-                        // A step cut short by the limit says little against the wanted one.
-                        self.state.control.dt = self.state.control.dt.max(wanted.dt);
-                    }
-                    return Ok(());
-                }
-                Ok(false) => self.statistics.rejected_steps += 1,
-                Err(TryError::Signal(error)) => return Err(StepError::Signal(error)),
-                Err(TryError::Solve { residual, iterations, worst, reason }) => {
-                    self.statistics.rejected_steps += 1;
-                    if std::mem::take(&mut self.state.history.order) > 0 {
-                        continue;
-                    }
-                    self.state.control = Control { dt: 0.25 * dt, order: 1 };
-                    if self.state.control.dt < smallest {
-                        return Err(self.convergence_error(dt, residual, iterations, worst, reason));
-                    }
-                }
-            }
-            if self.state.control.dt < smallest {
-                let reason = "the step has become too small for the tolerance".to_owned();
-                return Err(self.convergence_error(dt, f64::NAN, 0, 0, reason));
-            }
         }
     }
 
@@ -305,7 +238,14 @@ impl Simulation {
         result
     }
 
-    fn convergence_error(&self, dt: f64, residual: f64, iterations: usize, worst: usize, reason: String) -> StepError {
+    pub(super) fn convergence_error(
+        &self,
+        dt: f64,
+        residual: f64,
+        iterations: usize,
+        worst: usize,
+        reason: String,
+    ) -> StepError {
         let dofs = self.model.network.node_dofs();
         StepError::Convergence {
             time: self.state.time,
@@ -320,7 +260,7 @@ impl Simulation {
     }
 
     /// Tries one step of the given length and order; whether it was accepted.
-    fn try_step(&mut self, dt: f64, order: usize) -> Result<bool, TryError> {
+    pub(super) fn try_step(&mut self, dt: f64, order: usize) -> Result<bool, TryError> {
         let order = order.min(self.state.history.past.len() + 1);
         let (t0, t1) = (self.state.time, self.state.time + dt);
         let mut trial = std::mem::take(&mut self.trial);
@@ -469,29 +409,6 @@ impl Simulation {
             state.contacts.extend_from_slice(contact.forces());
         }
         self.statistics.steps += 1;
-    }
-
-    /// The state at a time within the last step, interpolated to the order of the past states.
-    ///
-    /// Frames are transported from those of the present state, so that material frames are continuous. Contact forces are
-    /// those of the present state.
-    ///
-    /// # Errors
-    /// [`StepError::Signal`] if a motor's function of time fails.
-    pub fn state_at(&self, time: f64) -> Result<State, StepError> {
-        let mut state = self.state.clone();
-        let order = state.history.past.len().min(state.control.order + 1);
-        let now = self.state.time;
-        self.state.history.extrapolate(order, (now, &self.state.q), |s| &s.q, time, &mut state.q);
-        self.state.history.extrapolate(order, (now, &self.state.velocity), |s| &s.velocity, time, &mut state.velocity);
-        self.state.history.extrapolate(order, (now, &self.state.density), |s| &s.density, time, &mut state.density);
-        for (k, motor) in self.model.motors.iter().enumerate() {
-            if let Drive::Speed(signal) = &motor.drive {
-                state.motor_angles[k] -= signal.integral(time, now).map_err(StepError::Signal)?;
-            }
-        }
-        state.time = time;
-        Ok(state)
     }
 }
 

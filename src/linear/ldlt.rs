@@ -2,14 +2,15 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
+use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
 use super::LinearError;
 use super::pattern::Pattern;
+use super::sparse::view;
 
 /// Sparse LDL^T without pivoting; only the upper triangle of the matrix is read.
 pub struct SparseLdlt {
@@ -17,16 +18,6 @@ pub struct SparseLdlt {
     values: Vec<f64>,
     memory: MemBuffer,
     factored: bool,
-}
-
-fn view(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, usize> {
-    SymbolicSparseColMatRef::new_checked(
-        pattern.size(),
-        pattern.size(),
-        pattern.column_starts(),
-        None,
-        pattern.row_indices(),
-    )
 }
 
 impl SparseLdlt {

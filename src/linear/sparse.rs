@@ -16,7 +16,8 @@ pub struct SparseLu {
     factored: bool,
 }
 
-fn view(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, usize> {
+/// The pattern as faer sees it.
+pub(super) fn view(pattern: &Pattern) -> SymbolicSparseColMatRef<'_, usize> {
     SymbolicSparseColMatRef::new_checked(
         pattern.size(),
         pattern.size(),
