@@ -7,7 +7,7 @@
 //!   r1 = dE/dq + W f + dissipation - loads - contact,        r2 = A f - 8 pi mu dx/dt,
 //! ```
 //!
-//! so that no dense matrix is ever factored. How the linear systems are solved is told in [`super::solve`].
+//! so that no dense matrix is ever factored. How the linear systems are solved is told in `solve.rs`.
 
 use std::sync::Arc;
 use std::time::Instant;

@@ -5,7 +5,7 @@
 //! * [`state`]: the changing part, plain data that can be saved and restored to the last bit.
 //! * [`terms`]: inertia and loads, the terms that belong to no other room.
 //! * [`adaptive`]: steps of adaptive size and order, and output between them.
-//! * [`balance`]: the force balance of one step: residual and derivative; [`solve`]: its linear systems.
+//! * [`balance`]: the force balance of one step: residual and derivative; `solve`: its linear systems.
 //! * [`control`]: the size and order of adaptive steps.
 //! * [`newton`]: Newton's method with line search on that balance.
 //! * [`predictor`]: past states: guesses, backward differences, dense output.
