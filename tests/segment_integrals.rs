@@ -1,6 +1,7 @@
 //! The regularized Stokeslet segment against high-precision quadrature, its limits and its symmetries.
 
-use flagrs::fluid::segment::segment_blocks;
+use flagrs::fluid::lanes::Path;
+use flagrs::fluid::segment::{segment_blocks, segment_blocks_on};
 use flagrs::fluid::stokeslet::{HatWeights, mobility, velocity};
 use flagrs::{Mat3, Vec3};
 
@@ -67,28 +68,30 @@ fn pool(threads: usize) -> rayon::ThreadPool {
 }
 
 #[test]
-fn blocks_agree_with_high_precision_quadrature() {
+fn blocks_agree_with_high_precision_quadrature_on_every_path() {
     let cases = reference_table();
     assert!(cases.len() >= 600, "only {} cases", cases.len());
-    let mut worst = std::collections::BTreeMap::new();
-    for case in &cases {
-        let (m1, m2) = segment_blocks(&case.target, &case.start, &case.end, case.epsilon);
-        for (name, value, reference) in [("M1", m1, case.m1), ("M2", m2, case.m2)] {
-            let error = relative_error(&value, &reference);
-            assert!(
-                error < 1e-12,
-                "{} {name}: {error:e} at target {:?} start {:?} end {:?} epsilon {:e}",
-                case.label,
-                case.target,
-                case.start,
-                case.end,
-                case.epsilon
-            );
-            let entry = worst.entry(case.label.as_str()).or_insert(0.0_f64);
-            *entry = entry.max(error);
+    for path in Path::ALL.into_iter().filter(|path| path.is_available()) {
+        let mut worst = std::collections::BTreeMap::new();
+        for case in &cases {
+            let (m1, m2) = segment_blocks_on(path, &case.target, &case.start, &case.end, case.epsilon);
+            for (name, value, reference) in [("M1", m1, case.m1), ("M2", m2, case.m2)] {
+                let error = relative_error(&value, &reference);
+                assert!(
+                    error < 1e-12,
+                    "{path:?} {} {name}: {error:e} at target {:?} start {:?} end {:?} epsilon {:e}",
+                    case.label,
+                    case.target,
+                    case.start,
+                    case.end,
+                    case.epsilon
+                );
+                let entry = worst.entry(case.label.as_str()).or_insert(0.0_f64);
+                *entry = entry.max(error);
+            }
         }
+        println!("{path:?}: worst relative error by kind of case: {worst:?}");
     }
-    println!("worst relative error by kind of case: {worst:?}");
 }
 
 #[test]
@@ -203,16 +206,18 @@ fn mobility_holds_the_blocks_by_columns_and_sums_them_at_shared_nodes() {
 
 #[test]
 fn mobility_is_bit_identical_on_any_number_of_threads() {
+    let (nodes, chain, _) = helix(121);
     // A ring with a branch, numbered so that edges cross from task to task.
-    let (nodes, _, _) = helix(61);
-    let edges: Vec<[usize; 2]> = (0..60).map(|k| [(7 * k) % 60, (7 * k + 7) % 60]).chain([[30, 60]]).collect();
-    let epsilon: Vec<f64> = (0..edges.len()).map(|k| 1e-3 * (1.0 + 0.01 * k as f64)).collect();
-    let mut serial = vec![0.0; 9 * 61 * 61];
-    mobility(&nodes, &nodes, &edges, &epsilon, &mut serial, None);
-    for threads in [1, 2, 3, 8] {
-        let mut parallel = vec![f64::NAN; serial.len()];
-        mobility(&nodes, &nodes, &edges, &epsilon, &mut parallel, Some(&pool(threads)));
-        assert!(serial == parallel, "{threads} threads");
+    let ring: Vec<[usize; 2]> = (0..120).map(|k| [(7 * k) % 120, (7 * k + 7) % 120]).chain([[30, 120]]).collect();
+    for edges in [chain, ring] {
+        let epsilon: Vec<f64> = (0..edges.len()).map(|k| 1e-3 * (1.0 + 0.01 * k as f64)).collect();
+        let mut serial = vec![0.0; 9 * 121 * 121];
+        mobility(&nodes, &nodes, &edges, &epsilon, &mut serial, None);
+        for threads in [1, 2, 3, 8] {
+            let mut parallel = vec![f64::NAN; serial.len()];
+            mobility(&nodes, &nodes, &edges, &epsilon, &mut parallel, Some(&pool(threads)));
+            assert!(serial == parallel, "{threads} threads");
+        }
     }
 }
 

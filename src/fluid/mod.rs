@@ -1,6 +1,7 @@
 //! The viscous fluid: models of the force it exerts on moving filaments, behind one trait.
 //!
-//! * [`segment`]: integrals of a regularized Stokeslet over a straight segment (all `unsafe` of the crate).
+//! * [`lanes`]: vectors of numbers on every machine's instructions, chosen at run time (all `unsafe` of the crate).
+//! * [`segment`]: integrals of a regularized Stokeslet over a straight segment.
 //! * [`stokeslet`]: mobility matrix, velocity field and hat-function weights of segment networks.
 //! * [`rss`]: nonlocal drag by regularized Stokeslet segments.
 //! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
@@ -8,6 +9,7 @@
 //! * [`head`]: drag and counter-torque of the seed's head.
 
 pub mod head;
+pub mod lanes;
 pub mod rft;
 pub mod rss;
 pub mod segment;

@@ -5,22 +5,22 @@
 //! density times the hat function of the node. Sums over edges run in the order of the edges, whatever the number of
 //! threads, so results are the same to the last bit on one thread and on many.
 
+use std::ops::Range;
+
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::segment::{Blocks, Collect, Segment, Symmetric, for_each_target};
+use super::lanes::{Lanes, Path, Write, coordinates_mut, write_triples};
+use super::segment::{Blocks, Collect, Segment, Symmetric, for_each_pair};
 use crate::Vec3;
 
-/// Target-edge pairs below which a thread pool is left alone. Waking it costs about 10 us however much there is to do
-/// (measured at 20 to 136 nodes), as long as 400 pairs take; two threads break even at twice that and gain a quarter or
-/// more from here on.
-const SMALLEST_PARALLEL: usize = 2000;
+/// Target-edge pairs below which a thread pool is left alone. Waking it costs about 7 us, as long as 900 pairs take with
+/// eight lanes; two threads break even below 2,000 pairs and gain a quarter near 3,000 (least of some thousand repeats, at
+/// 45 to 600 nodes on two cores; from 200 nodes on they take half the time of one).
+const SMALLEST_PARALLEL: usize = 2600;
 
 /// Tasks for each thread of a pool: more than one keeps the threads even, more than a few cost more than they save.
 const TASKS_PER_THREAD: usize = 2;
-
-/// Position of the entry (row, column) in [`Symmetric`].
-const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 /// Fills `out` with the dimensionless matrix `A` of `8 pi mu u = A f`.
 ///
@@ -50,6 +50,18 @@ pub fn mobility(
     out: &mut [f64],
     pool: Option<&ThreadPool>,
 ) {
+    mobility_on(Path::chosen(), targets, nodes, edges, epsilon, out, pool);
+}
+
+fn mobility_on(
+    path: Path,
+    targets: &[Vec3],
+    nodes: &[Vec3],
+    edges: &[[usize; 2]],
+    epsilon: &[f64],
+    out: &mut [f64],
+    pool: Option<&ThreadPool>,
+) {
     assert_eq!(out.len(), 9 * targets.len() * nodes.len(), "out must hold 3 targets x 3 nodes");
     check_edges(nodes, edges, epsilon);
     if out.is_empty() {
@@ -57,16 +69,12 @@ pub fn mobility(
     }
     let node_width = 9 * targets.len();
     let fill = |first_node: usize, columns: &mut [f64]| {
-        columns.fill(0.0);
-        let local_nodes = columns.len() / node_width;
-        let local = |node: usize| node.checked_sub(first_node).filter(|&local| local < local_nodes);
-        for (&[i, j], &epsilon) in edges.iter().zip(epsilon) {
-            let (start, end) = columns_of(columns, node_width, local(i), local(j));
-            if start.is_some() || end.is_some() {
-                let mut columns = EdgeColumns { start: start.map(NodeColumns::new), end: end.map(NodeColumns::new) };
-                for_each_target(&Segment::new(&nodes[i], &nodes[j], epsilon), targets, &mut columns);
-            }
+        let nodes_here = first_node..first_node + columns.len() / node_width;
+        let (segments, routes, touched) = route(nodes, edges, epsilon, nodes_here);
+        for (columns, _) in columns.chunks_exact_mut(node_width).zip(&touched).filter(|(_, touched)| !**touched) {
+            columns.fill(0.0);
         }
+        for_each_pair(path, &segments, targets, &mut Columns { columns, routes: &routes, column: 3 * targets.len() });
     };
     match worthwhile(pool, targets.len() * edges.len()) {
         None => fill(0, out),
@@ -82,65 +90,121 @@ pub fn mobility(
     }
 }
 
-/// The parts of `columns` that belong to two different nodes, of those that are there.
-fn columns_of(
-    columns: &mut [f64],
-    width: usize,
-    start: Option<usize>,
-    end: Option<usize>,
-) -> (Option<&mut [f64]>, Option<&mut [f64]>) {
-    match (start, end) {
-        (Some(i), Some(j)) if i < j => {
-            let (low, high) = columns.split_at_mut(j * width);
-            (Some(&mut low[i * width..(i + 1) * width]), Some(&mut high[..width]))
+/// Where the blocks of an edge go, among the nodes of one task.
+struct Route {
+    /// The block of the start, if the node is here.
+    start: Option<Place>,
+    /// Whether what the edge before carries over belongs to the start.
+    takes_over: bool,
+    end: End,
+}
+
+/// Where the block of an edge's end goes.
+enum End {
+    /// The node belongs to another task.
+    Elsewhere,
+    At(Place),
+    /// The next edge starts there, and takes it along: a chain writes every number of the matrix once.
+    Carried,
+}
+
+/// A node, counted from the first of the task, and what to do with the values there.
+#[derive(Clone, Copy)]
+struct Place {
+    node: usize,
+    write: Write,
+}
+
+/// The edges with an end among the nodes `here`, where their blocks go, and which of the nodes have any edge.
+///
+/// Which blocks are added to one another before they are written depends on the whole network alone, not on `here`: sums
+/// are the same however the nodes are dealt out.
+fn route(
+    nodes: &[Vec3],
+    edges: &[[usize; 2]],
+    epsilon: &[f64],
+    here: Range<usize>,
+) -> (Vec<Segment>, Vec<Route>, Vec<bool>) {
+    let mut touched = vec![false; here.len()];
+    // The first edge of a node writes over what was there, which spares a pass of zeros over the whole matrix.
+    let mut place = |node: usize| {
+        let node = node - here.start;
+        let write = if std::mem::replace(&mut touched[node], true) { Write::Add } else { Write::Over };
+        Place { node, write }
+    };
+    let (mut segments, mut routes) = (Vec::with_capacity(edges.len()), Vec::with_capacity(edges.len()));
+    let mut takes_over = false;
+    for (index, &[i, j]) in edges.iter().enumerate() {
+        let (has_start, has_end) = (here.contains(&i), here.contains(&j));
+        if !has_start && !has_end {
+            continue;
         }
-        (Some(i), Some(j)) => {
-            let (low, high) = columns.split_at_mut(i * width);
-            (Some(&mut high[..width]), Some(&mut low[j * width..(j + 1) * width]))
-        }
-        (Some(i), None) => (Some(&mut columns[i * width..(i + 1) * width]), None),
-        (None, Some(j)) => (None, Some(&mut columns[j * width..(j + 1) * width])),
-        (None, None) => (None, None),
+        let start = has_start.then(|| place(i));
+        let end = if !has_end {
+            End::Elsewhere
+        } else if edges.get(index + 1).is_some_and(|next| next[0] == j) {
+            End::Carried
+        } else {
+            End::At(place(j))
+        };
+        let carries = matches!(end, End::Carried);
+        segments.push(Segment::new(&nodes[i], &nodes[j], epsilon[index]));
+        routes.push(Route { start, takes_over, end });
+        takes_over = carries;
+    }
+    (segments, routes, touched)
+}
+
+/// The columns of consecutive nodes, three of each, which collect the blocks of every edge.
+struct Columns<'a> {
+    columns: &'a mut [f64],
+    routes: &'a [Route],
+    /// Length of a column.
+    column: usize,
+}
+
+impl Columns<'_> {
+    #[inline(always)]
+    fn write<L: Lanes>(&mut self, first: usize, place: Place, block: &Symmetric<L>) {
+        let count = (3 * L::WIDTH).min(self.column - 3 * first);
+        let at = 3 * self.column * place.node + 3 * first;
+        let b = block;
+        write_triples([b[0], b[1], b[2]], place.write, &mut self.columns[at..][..count]);
+        write_triples([b[1], b[3], b[4]], place.write, &mut self.columns[at + self.column..][..count]);
+        write_triples([b[2], b[4], b[5]], place.write, &mut self.columns[at + 2 * self.column..][..count]);
     }
 }
 
-/// The three columns of a node, with the components of a target together.
-struct NodeColumns<'a>([&'a mut [[f64; 3]]; 3]);
+impl Collect for Columns<'_> {
+    /// The block of a node that the next edge shares.
+    type Carried<L: Lanes> = Symmetric<L>;
 
-impl<'a> NodeColumns<'a> {
-    fn new(columns: &'a mut [f64]) -> Self {
-        let (x, yz) = columns.split_at_mut(columns.len() / 3);
-        let (y, z) = yz.split_at_mut(yz.len() / 2);
-        Self([x, y, z].map(|column| column.as_chunks_mut().0))
+    #[inline(always)]
+    fn begin<L: Lanes>() -> Symmetric<L> {
+        [L::splat(0.0); 6]
     }
 
     #[inline(always)]
-    fn add(&mut self, target: usize, block: &Symmetric) {
-        for (column, entries) in self.0.iter_mut().zip(&ENTRY) {
-            let column = &mut column[target];
-            for (value, &entry) in column.iter_mut().zip(entries) {
-                *value += block[entry];
+    fn collect<L: Lanes>(&mut self, first: usize, segment: usize, blocks: &Blocks<L>, carried: &mut Symmetric<L>) {
+        let route = &self.routes[segment];
+        if let Some(place) = route.start {
+            let mut block = blocks.start;
+            if route.takes_over {
+                for k in 0..6 {
+                    block[k] = carried[k] + block[k];
+                }
             }
+            self.write(first, place, &block);
+        }
+        match route.end {
+            End::Elsewhere => {}
+            End::At(place) => self.write(first, place, &blocks.end),
+            End::Carried => *carried = blocks.end,
         }
     }
-}
 
-/// The columns that collect the blocks of an edge: both ends' or, where tasks meet, one end's.
-struct EdgeColumns<'a> {
-    start: Option<NodeColumns<'a>>,
-    end: Option<NodeColumns<'a>>,
-}
-
-impl Collect for EdgeColumns<'_> {
     #[inline(always)]
-    fn collect(&mut self, target: usize, blocks: &Blocks) {
-        if let Some(columns) = &mut self.start {
-            columns.add(target, &blocks.start);
-        }
-        if let Some(columns) = &mut self.end {
-            columns.add(target, &blocks.end);
-        }
-    }
+    fn finish<L: Lanes>(&mut self, _: usize, _: Symmetric<L>) {}
 }
 
 /// Fills `out` with the velocity (m/s) of the fluid at `points` (m).
@@ -161,19 +225,18 @@ pub fn velocity(
     out: &mut [Vec3],
     pool: Option<&ThreadPool>,
 ) {
+    let path = Path::chosen();
     assert_eq!(out.len(), points.len(), "out must hold one velocity for every point");
     assert_eq!(density.len(), nodes.len(), "density must hold one vector for every node");
     check_edges(nodes, edges, epsilon);
     let scale = 1.0 / (8.0 * std::f64::consts::PI * viscosity);
+    let segments: Vec<Segment> =
+        edges.iter().zip(epsilon).map(|(&[i, j], &epsilon)| Segment::new(&nodes[i], &nodes[j], epsilon)).collect();
+    let densities: Vec<[[f64; 3]; 2]> =
+        edges.iter().map(|edge| edge.map(|node| (density[node] * scale).into())).collect();
     let fill = |(points, out): (&[Vec3], &mut [Vec3])| {
-        out.fill(Vec3::zeros());
-        for (&[i, j], &epsilon) in edges.iter().zip(epsilon) {
-            let segment = Segment::new(&nodes[i], &nodes[j], epsilon);
-            for_each_target(&segment, points, &mut Flow { velocity: out, f_start: density[i], f_end: density[j] });
-        }
-        for u in out.iter_mut() {
-            *u *= scale;
-        }
+        let mut flow = Flow { velocity: coordinates_mut(out), densities: &densities };
+        for_each_pair(path, &segments, points, &mut flow);
     };
     match worthwhile(pool, points.len() * edges.len()) {
         None => fill((points, out)),
@@ -185,27 +248,41 @@ pub fn velocity(
     }
 }
 
-/// Flow that collects what an edge's density brings, times 8 pi mu.
+/// Velocities of consecutive points, which sum up what every edge's density brings.
 struct Flow<'a> {
-    velocity: &'a mut [Vec3],
-    f_start: Vec3,
-    f_end: Vec3,
+    velocity: &'a mut [f64],
+    /// Force densities over 8 pi mu at the start and at the end of each edge, m/s.
+    densities: &'a [[[f64; 3]; 2]],
 }
 
 impl Collect for Flow<'_> {
+    type Carried<L: Lanes> = [L; 3];
+
     #[inline(always)]
-    fn collect(&mut self, target: usize, blocks: &Blocks) {
-        self.velocity[target] += apply(&blocks.start, &self.f_start) + apply(&blocks.end, &self.f_end);
+    fn begin<L: Lanes>() -> [L; 3] {
+        [L::splat(0.0); 3]
+    }
+
+    #[inline(always)]
+    fn collect<L: Lanes>(&mut self, _: usize, segment: usize, blocks: &Blocks<L>, velocity: &mut [L; 3]) {
+        let [start, end] = &self.densities[segment];
+        add_product(&blocks.start, start, velocity);
+        add_product(&blocks.end, end, velocity);
+    }
+
+    #[inline(always)]
+    fn finish<L: Lanes>(&mut self, first: usize, velocity: [L; 3]) {
+        let count = (3 * L::WIDTH).min(self.velocity.len() - 3 * first);
+        write_triples(velocity, Write::Over, &mut self.velocity[3 * first..][..count]);
     }
 }
 
 #[inline(always)]
-fn apply(b: &Symmetric, f: &Vec3) -> Vec3 {
-    Vec3::new(
-        b[0] * f.x + b[1] * f.y + b[2] * f.z,
-        b[1] * f.x + b[3] * f.y + b[4] * f.z,
-        b[2] * f.x + b[4] * f.y + b[5] * f.z,
-    )
+fn add_product<L: Lanes>(b: &Symmetric<L>, f: &[f64; 3], sum: &mut [L; 3]) {
+    let f = [L::splat(f[0]), L::splat(f[1]), L::splat(f[2])];
+    sum[0] = b[0].mul_add(f[0], b[1].mul_add(f[1], b[2].mul_add(f[2], sum[0])));
+    sum[1] = b[1].mul_add(f[0], b[3].mul_add(f[1], b[4].mul_add(f[2], sum[1])));
+    sum[2] = b[2].mul_add(f[0], b[4].mul_add(f[1], b[5].mul_add(f[2], sum[2])));
 }
 
 fn check_edges(nodes: &[Vec3], edges: &[[usize; 2]], epsilon: &[f64]) {
@@ -308,6 +385,47 @@ impl HatWeights {
         for values in matrix.chunks_exact_mut(n.max(1)) {
             column.copy_from_slice(values);
             self.apply(column, values);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn helix(count: usize) -> Vec<Vec3> {
+        let at = |k: f64| Vec3::new(3.2e-3 * k, 1e-2 * (0.39 * k).cos(), 1e-2 * (0.39 * k).sin());
+        (0..count).map(|k| at(k as f64)).collect()
+    }
+
+    #[test]
+    fn every_path_with_fused_arithmetic_fills_the_same_matrix_and_nothing_else() {
+        let nodes = helix(9);
+        // A chain, numbered both ways, a branch and a node without an edge.
+        let edges = [[0, 1], [1, 2], [2, 3], [5, 4], [4, 3], [2, 6], [6, 7]];
+        let epsilon: Vec<f64> = (0..edges.len()).map(|k| 1e-3 * (1.0 + 0.1 * k as f64)).collect();
+        for count in 1..=19 {
+            let targets = helix(count);
+            let size = 9 * count * nodes.len();
+            let matrix = |path| {
+                let mut out = vec![-7.0; size + 9];
+                mobility_on(path, &targets, &nodes, &edges, &epsilon, &mut out[..size], None);
+                assert_eq!(out[size..], [-7.0; 9], "{path:?}: written past the end");
+                out.truncate(size);
+                out
+            };
+            let reference = matrix(Path::chosen());
+            assert!(reference[size - 9 * count..].iter().all(|&entry| entry == 0.0), "no edge, no flow");
+            let scale = reference.iter().fold(0.0_f64, |scale, entry| scale.max(entry.abs()));
+            for path in Path::ALL.into_iter().filter(|path| path.is_available()) {
+                let matrix = matrix(path);
+                if path == Path::Separate {
+                    let apart = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-14 * scale;
+                    assert!(matrix.iter().zip(&reference).all(apart), "{count} targets");
+                } else {
+                    assert!(matrix == reference, "{path:?}, {count} targets");
+                }
+            }
         }
     }
 }
