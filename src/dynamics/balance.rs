@@ -222,7 +222,8 @@ impl Balance {
     }
 
     /// Prepares a step: the fluid's force, if it is that of the last velocities, and no contact.
-    pub fn begin(&mut self, step: &Step) -> Result<(), LinearError> {
+    pub fn begin(&mut self, step: &Step, statistics: &mut Statistics) -> Result<(), LinearError> {
+        let start = Instant::now();
         self.contact.fill(0.0);
         self.constant.fill(0.0);
         if let Some(fluid) = self.fluid.as_mut().filter(|_| !step.scheme.fluid_is_implicit()) {
@@ -230,6 +231,7 @@ impl Balance {
             fluid.resist(&mut self.flow)?;
             scatter(&self.fluid_dofs, &self.flow, &mut self.constant);
         }
+        statistics.seconds_fluid += start.elapsed().as_secs_f64();
         Ok(())
     }
 

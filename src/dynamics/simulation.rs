@@ -342,7 +342,7 @@ impl Simulation {
             self.fluid_step = Some(state.steps);
         }
         let step = Step::new(*scheme, state, dt, order, motors);
-        balance.begin(&step)?;
+        balance.begin(&step, statistics)?;
         let failed = |failure: newton::NewtonFailure| TryError::Solve {
             residual: failure.residual,
             iterations: failure.iterations,

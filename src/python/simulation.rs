@@ -305,7 +305,8 @@ impl Simulation {
     /// Takes over a state saved by `state()` of a simulation of the same scene.
     fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
         let current = self.inner.state();
-        let state = State {
+        let flow = current.density.len();
+        let mut state = State {
             time: first(&saved.time),
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
             q: values(&saved.q),
@@ -321,16 +322,22 @@ impl Simulation {
             motor_angles: values(&saved.motor_angles),
             contacts: contacts(&saved),
         };
+        // Schemes without a force density of their own save an empty one; the next step finds it.
+        let kept = state.density.len();
+        if kept != flow && (kept == 0 || flow == 0) {
+            state.density = vec![0.0; flow];
+            state.history.past.iter_mut().for_each(|sample| sample.density = vec![0.0; flow]);
+        }
         let same = state.q.len() == current.q.len()
             && state.velocity.len() == current.velocity.len()
             && state.frames.tangents.len() == current.frames.tangents.len()
             && state.frames.directors.len() == current.frames.directors.len()
             && state.frames.twists.len() == current.frames.twists.len()
             && state.motor_angles.len() == current.motor_angles.len()
-            && state.density.len() == current.density.len()
+            && state.density.len() == flow
             && saved.history_states.shape() == [state.history.past.len(), current.q.len()]
             && saved.history_velocities.shape() == [state.history.past.len(), current.q.len()]
-            && saved.history_densities.shape() == [state.history.past.len(), current.density.len()];
+            && saved.history_densities.shape() == [state.history.past.len(), kept];
         let edges = self.inner.model().network().edges().len();
         let pairs = saved.contact_pairs.as_array();
         let known = pairs.ncols() == 2

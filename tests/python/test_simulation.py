@@ -334,3 +334,18 @@ def test_a_step_that_cannot_be_solved_says_where_and_keeps_the_last_good_state()
     assert simulation.statistics["rejected_steps"] > 1
     assert np.isfinite(simulation.nodes).all()
     assert np.isfinite(simulation.energy()["total"])
+
+
+def test_a_state_goes_on_in_another_scheme() -> None:
+    scene = scenarios.robot(edge_length=9e-3)
+    first = Simulation(scene, threads=1)
+    first.step(3)
+    for scheme, dt in (("explicit", 1e-4), ("implicit", 1e-3)):
+        second = Simulation(scene, scheme=scheme, dt=dt, threads=1)
+        second.load_state(first.state())
+        assert np.array_equal(second.nodes, first.nodes)
+        second.step(3)
+        back = Simulation(scene, threads=1)
+        back.load_state(second.state())
+        back.step(1)
+        assert back.time > second.time > first.time
