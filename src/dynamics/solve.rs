@@ -212,9 +212,10 @@ impl FluidSystem<'_> {
         let rate = self.rate;
         let Some(mobility) = self.fluid.nonlocal() else { return Ok(()) };
         mobility.unweigh(self.density)?;
-        let swept: Vec<f64> = image.iter().map(|moved| scale * rate * moved).collect();
         mobility.apply(self.density, image);
-        image.iter_mut().zip(&swept).for_each(|(value, swept)| *value -= swept);
+        for (&dof, value) in self.fluid_dofs.iter().zip(image.chunks_exact_mut(3)) {
+            (0..3).filter(|&c| !prescribed[dof + c]).for_each(|c| value[c] -= scale * rate * moved[dof + c]);
+        }
         Ok(())
     }
 
