@@ -22,7 +22,6 @@ from flagrs.scene.values import Bounds, FloatArray, IntArray
 from flagrs.threads import thread_count
 from flagrs.time_step import (
     LOCAL_SHARE,
-    RESIDUAL_SHARE,
     STABLE_SHARE,
     default_step,
     explicit_limit,
@@ -109,7 +108,7 @@ class Simulation:
         self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
         self._restored: Path | None = None
         if rtol is not None:
-            self._native.set_tolerance((LOCAL_SHARE * rtol * size(scene), RESIDUAL_SHARE * rtol))
+            self._native.set_tolerance(LOCAL_SHARE * rtol * size(scene))
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
 

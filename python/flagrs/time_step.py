@@ -16,10 +16,8 @@ TURN_PER_STEP = 0.05
 STABLE_SHARE = 0.2
 
 
-#: Local error of a step, and relative residual of its equations, over the relative error asked for (measured:
-#: docs/performance.md, "rtol holds").
+#: Local error of a step over the relative error asked for (measured: docs/performance.md, "rtol holds").
 LOCAL_SHARE = 0.2
-RESIDUAL_SHARE = 0.5
 
 
 def size(scene: Scene) -> float:

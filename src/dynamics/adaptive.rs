@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::control::Control;
-use super::newton::NewtonSettings;
+use super::newton::{Goal, NewtonSettings};
 use super::simulation::{Simulation, StepError, TryError};
 use super::state::State;
 use crate::elastic::motors::Drive;
@@ -12,12 +12,21 @@ use crate::elastic::motors::Drive;
 const FIRST_STEP: f64 = 1e-2;
 const SMALLEST_STEP: f64 = 1e-9;
 
+/// Factor on a step whose equations could not be solved.
+const FAILED_FACTOR: f64 = 0.4;
+
+/// Part of the local error that may be left to the solution of a step's equations.
+const NEWTON_SHARE: f64 = 0.1;
+
 impl Simulation {
     /// Makes the local error of every step at most `tolerance` metres by choosing its size and order; `None` goes back to
     /// steps of `dt`, first order.
-    pub fn set_tolerance(&mut self, tolerance: Option<(f64, f64)>) {
-        self.tolerance = tolerance.map(|(length, _)| length);
-        self.settings.tolerance = tolerance.map_or(NewtonSettings::default().tolerance, |(_, residual)| residual);
+    pub fn set_tolerance(&mut self, tolerance: Option<f64>) {
+        self.tolerance = tolerance;
+        self.settings = NewtonSettings::default();
+        if let Some(length) = tolerance {
+            self.settings.goal = Goal::Displacement(NEWTON_SHARE * length);
+        }
     }
 
     /// Makes one adaptive step, not beyond `limit`.
@@ -60,10 +69,7 @@ impl Simulation {
                 Err(TryError::Signal(error)) => return Err(StepError::Signal(error)),
                 Err(TryError::Solve { residual, iterations, worst, reason }) => {
                     self.statistics.rejected_steps += 1;
-                    if std::mem::take(&mut self.state.history.order) > 0 {
-                        continue;
-                    }
-                    self.state.control = Control { dt: 0.25 * dt, order: 1 };
+                    self.state.control = Control { dt: FAILED_FACTOR * dt, order: wanted.order.min(2) };
                     if self.state.control.dt < smallest {
                         return Err(self.convergence_error(dt, residual, iterations, worst, reason));
                     }

@@ -23,8 +23,7 @@ use crate::elastic::motors::Drive;
 use crate::fluid::FluidModel;
 use crate::linear::LinearError;
 use crate::linear::krylov::Gmres;
-use crate::linear::ldlt::SparseLdlt;
-use crate::linear::sparse::SparseLu;
+use crate::linear::nearly_symmetric::NearlySymmetric;
 use crate::rod::assembly::{Assembly, Increment, Term};
 use crate::rod::configuration::{Configuration, ShaftAngle};
 use crate::{Mat3, Vec3};
@@ -100,11 +99,13 @@ pub(super) struct Size {
     pub worst: usize,
 }
 
-/// A trial solution: degrees of freedom and force density.
+/// A trial solution: degrees of freedom and force density, and the tensions of edges as Newton's method sees them, linear
+/// from iterate to iterate.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Unknowns {
     pub q: Vec<f64>,
     pub density: Vec<f64>,
+    pub tensions: Vec<f64>,
 }
 
 /// Workspace of the force balance; no evaluation allocates.
@@ -118,8 +119,7 @@ pub(super) struct Balance {
     pub(super) jacobian: Vec<f64>,
     masked: Vec<usize>,
     diagonal: Vec<usize>,
-    pub(super) ldlt: SparseLdlt,
-    pub(super) lu: SparseLu,
+    pub(super) system: NearlySymmetric,
     pub(super) gmres: Gmres,
     pub(super) fluid: Option<Box<dyn FluidModel>>,
     pub(super) fluid_dofs: Vec<usize>,
@@ -174,8 +174,7 @@ impl Balance {
             jacobian: vec![0.0; pattern.entries()],
             masked,
             diagonal,
-            ldlt: SparseLdlt::new(pattern)?,
-            lu: SparseLu::new(pattern)?,
+            system: NearlySymmetric::new(pattern.clone())?,
             gmres: Gmres::new(size, KRYLOV_LIMIT.min(size)),
             work: super::solve::Work::new(n, 3 * fluid_dofs.len()),
             slip: vec![0.0; 3 * fluid_dofs.len()],
@@ -366,12 +365,13 @@ impl Balance {
         Some(mean / fluid.nonlocal()?.scale())
     }
 
-    /// Derivative of the force balance at the configuration of the last residual, and the matrix that preconditions it.
-    pub(super) fn differentiate(&mut self, model: &Model, step: &Step) {
+    /// Derivative of the force balance at the configuration of the last residual and the given tensions of edges, with every
+    /// node's own resistance in place of the nonlocal one.
+    pub(super) fn differentiate(&mut self, model: &Model, step: &Step, tensions: &[f64]) {
         let increment = step.increment();
         self.jacobian.fill(0.0);
         let mut out = Assembly { residual: &mut self.elastic, jacobian: Some(&mut self.jacobian) };
-        model.stretching.add(&self.configuration, &increment, &mut out);
+        model.stretching.add_with_tensions(&self.configuration, tensions, &mut out);
         model.hinges.add(&self.configuration, &increment, &mut out);
         if step.scheme.has_inertia() {
             model.inertia.add(&self.configuration, &increment, &mut out);

@@ -349,6 +349,7 @@ fn initial_state(specification: &Specification, network: &Network, dof_count: us
         control: Control::default(),
         history: History::default(),
         frames: shape_frames(specification, network, &specification.nodes),
+        tensions: vec![0.0; network.edges().len()],
         motor_angles: vec![0.0; specification.motors.len()],
         contacts: Vec::new(),
     }

@@ -3,19 +3,29 @@
 use super::balance::{Balance, Size, Step, Unknowns};
 use super::model::Model;
 use super::statistics::Statistics;
+use crate::linear::LinearError;
+
+/// Where Newton's method stops.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Goal {
+    /// Largest residual force, relative to the largest force in the balance: forces and torques then balance that well.
+    Residual(f64),
+    /// Largest displacement, m, by which the solution is still to be corrected. Tensions may then be off by the axial stiffness
+    /// times a strain that no one can see, as long as the nodes are where they should be.
+    Displacement(f64),
+}
 
 /// How far and how long Newton's method goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NewtonSettings {
-    /// Residual force at which it stops, relative to the largest force in the balance.
-    pub tolerance: f64,
+    pub goal: Goal,
     /// Most iterations.
     pub max_iterations: usize,
 }
 
 impl Default for NewtonSettings {
     fn default() -> Self {
-        Self { tolerance: 1e-10, max_iterations: 40 }
+        Self { goal: Goal::Residual(1e-10), max_iterations: 40 }
     }
 }
 
@@ -32,8 +42,12 @@ pub(super) struct NewtonFailure {
 const LINEAR_TOLERANCE: f64 = 1e-6;
 /// Share of the remaining distance to the target that a linear system may leave.
 const LINEAR_SHARE: f64 = 0.1;
-/// Loosest linear system.
+/// Loosest linear system, by goal: a residual that is to fall to its target, a correction that is to fall below its own.
 const LOOSEST: f64 = 1e-2;
+const LOOSEST_CORRECTION: f64 = 0.1;
+/// How often, and by how much, the correction may grow under full steps.
+const UPHILL_ITERATIONS: usize = 3;
+const UPHILL: f64 = 2.0;
 /// Halvings of a step that does not reduce the residual.
 const BACKTRACKS: usize = 14;
 /// A residual this many times the target that no longer falls is accepted as converged.
@@ -49,54 +63,134 @@ pub(super) fn solve(
     unknowns: &mut Unknowns,
     statistics: &mut Statistics,
 ) -> Result<(), NewtonFailure> {
-    let failure = |size: Option<Size>, iterations: usize, reason: &str| NewtonFailure {
+    let mut newton = Newton { balance, model, step, work, unknowns, statistics };
+    match settings.goal {
+        Goal::Residual(tolerance) => newton.reduce_residual(tolerance, settings.max_iterations),
+        Goal::Displacement(tolerance) => newton.reduce_correction(tolerance, settings.max_iterations),
+    }
+}
+
+fn failure(size: Option<Size>, iterations: usize, reason: &str) -> NewtonFailure {
+    NewtonFailure {
         residual: size.map_or(f64::NAN, |size| size.norm),
         iterations,
         worst: size.map_or(0, |size| size.worst),
         reason: reason.to_owned(),
-    };
-    let floor = round_off(balance, model, step, &unknowns.q);
-    let Some(mut size) = balance.evaluate(model, step, unknowns, statistics) else {
-        return Err(failure(None, 0, "the guess is not a configuration"));
-    };
-    let target = |size: &Size| (settings.tolerance * size.scale.max(1e-8 * model.bending_scale)).max(floor);
-    for iteration in 0..settings.max_iterations {
-        let target = target(&size);
-        if size.norm <= target {
-            return Ok(());
-        }
-        statistics.newton_iterations += 1;
-        let linear = (LINEAR_SHARE * target / size.norm).clamp(LINEAR_TOLERANCE, LOOSEST);
-        let direction = (&mut work.direction.q[..], &mut work.direction.density[..]);
-        if let Err(error) = balance.direction(model, step, linear, direction, statistics) {
-            return Err(failure(Some(size), iteration, &error.to_string()));
-        }
-        let mut length = 1.0;
-        let mut accepted = None;
-        for _ in 0..BACKTRACKS {
-            work.try_length(unknowns, length);
-            let trial = balance.evaluate(model, step, &work.trial, statistics);
-            if let Some(trial) = trial.filter(|trial| trial.merit < (1.0 - 1e-4 * length) * size.merit) {
-                accepted = Some(trial);
-                break;
-            }
-            length *= 0.5;
-        }
-        let Some(next) = accepted else {
-            if size.norm <= STAGNATION * target {
-                // The configuration is left at the last trial: bring it back to the accepted point.
-                let _ = balance.evaluate(model, step, unknowns, statistics);
+    }
+}
+
+/// The parts of one solve.
+struct Newton<'a, 'b> {
+    balance: &'a mut Balance,
+    model: &'a Model,
+    step: &'a Step<'b>,
+    work: &'a mut NewtonWork,
+    unknowns: &'a mut Unknowns,
+    statistics: &'a mut Statistics,
+}
+
+impl Newton<'_, '_> {
+    fn evaluate_start(&mut self) -> Result<Size, NewtonFailure> {
+        let size = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
+        size.ok_or_else(|| failure(None, 0, "the guess is not a configuration"))
+    }
+
+    /// Residual at the given part of the direction.
+    fn try_length(&mut self, length: f64) -> Option<Size> {
+        self.work.try_length(self.unknowns, length);
+        self.balance.evaluate(self.model, self.step, &self.work.trial, self.statistics)
+    }
+
+    fn accept(&mut self) {
+        std::mem::swap(self.unknowns, &mut self.work.trial);
+    }
+
+    fn linearize(&mut self) -> Result<(), LinearError> {
+        self.statistics.newton_iterations += 1;
+        self.balance.linearize(self.model, self.step, &self.unknowns.tensions, self.statistics)
+    }
+
+    fn find_direction(&mut self, tolerance: f64) -> Result<(), LinearError> {
+        let tensions = &self.unknowns.tensions;
+        self.balance.direction(self.model, self.step, tensions, tolerance, &mut self.work.direction, self.statistics)
+    }
+
+    fn correction(&mut self) -> Result<f64, LinearError> {
+        self.balance.correction(self.model, self.step, self.statistics)
+    }
+
+    fn reduce_residual(&mut self, tolerance: f64, max_iterations: usize) -> Result<(), NewtonFailure> {
+        let floor = round_off(self.balance, self.model, self.step, &self.unknowns.q);
+        let least = 1e-8 * self.model.bending_scale;
+        let target = |size: &Size| (tolerance * size.scale.max(least)).max(floor);
+        let mut size = self.evaluate_start()?;
+        for iteration in 0..max_iterations {
+            let target = target(&size);
+            if size.norm <= target {
                 return Ok(());
             }
-            return Err(failure(Some(size), iteration, "the line search found no lower residual"));
-        };
-        std::mem::swap(unknowns, &mut work.trial);
-        size = next;
+            let linear = (LINEAR_SHARE * target / size.norm).clamp(LINEAR_TOLERANCE, LOOSEST);
+            self.linearize()
+                .and_then(|()| self.find_direction(linear))
+                .map_err(|error| failure(Some(size), iteration, &error.to_string()))?;
+            let mut length = 1.0;
+            let lower = (0..BACKTRACKS).find_map(|_| {
+                let sufficient = (1.0 - 1e-4 * length) * size.merit;
+                let trial = self.try_length(length).filter(|trial| trial.merit < sufficient);
+                length *= 0.5;
+                trial
+            });
+            let Some(lower) = lower else {
+                if size.norm <= STAGNATION * target {
+                    // The configuration is left at the last trial: bring it back to the accepted point.
+                    let _ = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
+                    return Ok(());
+                }
+                return Err(failure(Some(size), iteration, "the line search found no lower residual"));
+            };
+            self.accept();
+            size = lower;
+        }
+        if size.norm <= STAGNATION * target(&size) {
+            return Ok(());
+        }
+        Err(failure(Some(size), max_iterations, "too many iterations"))
     }
-    if size.norm <= STAGNATION * target(&size) {
-        return Ok(());
+
+    /// Newton's method that measures a residual by the displacement it asks for, with the factors at hand: residuals of stiff
+    /// and of soft directions then count alike (the natural level function of Deuflhard, Newton Methods, 2004, section 3.3).
+    fn reduce_correction(&mut self, tolerance: f64, max_iterations: usize) -> Result<(), NewtonFailure> {
+        let mut size = self.evaluate_start()?;
+        for iteration in 0..max_iterations {
+            let broken = |error: LinearError| failure(Some(size), iteration, &error.to_string());
+            self.linearize().map_err(broken)?;
+            let correction = self.correction().map_err(broken)?;
+            if correction <= tolerance {
+                return Ok(());
+            }
+            let linear = (LINEAR_SHARE * tolerance / correction).clamp(LINEAR_TOLERANCE, LOOSEST_CORRECTION);
+            self.find_direction(linear).map_err(broken)?;
+            let mut length = 1.0;
+            let lower = (0..BACKTRACKS).find_map(|_| {
+                // The first full steps may go uphill: the test itself is blurred while edges still turn by much.
+                let uphill = if length == 1.0 && iteration < UPHILL_ITERATIONS { UPHILL } else { 1.0 - 0.25 * length };
+                let sufficient = uphill * correction;
+                let trial = self.try_length(length)?;
+                let left = self.correction().ok()?;
+                length *= 0.5;
+                (left < sufficient.max(tolerance)).then_some((trial, left))
+            });
+            let Some((trial, left)) = lower else {
+                return Err(failure(Some(size), iteration, "the line search found no smaller correction"));
+            };
+            self.accept();
+            size = trial;
+            if left <= tolerance {
+                return Ok(());
+            }
+        }
+        Err(failure(Some(size), max_iterations, "too many iterations"))
     }
-    Err(failure(Some(size), settings.max_iterations, "too many iterations"))
 }
 
 /// Vectors of Newton's method.
@@ -118,6 +212,7 @@ impl NewtonWork {
         };
         move_along(&mut self.trial.q, &from.q, &self.direction.q);
         move_along(&mut self.trial.density, &from.density, &self.direction.density);
+        move_along(&mut self.trial.tensions, &from.tensions, &self.direction.tensions);
     }
 }
 

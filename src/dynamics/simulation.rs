@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::balance::{Balance, Step, Unknowns};
 use super::control::Control;
 use super::model::{Model, ModelError};
-use super::newton::{self, NewtonSettings, NewtonWork};
+use super::newton::{self, Goal, NewtonSettings, NewtonWork};
 use super::predictor::{History, Sample};
 use super::scheme::Scheme;
 use super::specification::Specification;
@@ -107,7 +107,7 @@ impl Simulation {
         let contact = model.contact.as_ref().map(ContactSolver::new);
         let mut state = state;
         state.density = balance.zero_density(scheme);
-        let trial = Unknowns { q: state.q.clone(), density: state.density.clone() };
+        let trial = Unknowns { q: state.q.clone(), density: state.density.clone(), tensions: state.tensions.clone() };
         Ok(Self {
             work: NewtonWork::new(&trial),
             trial,
@@ -185,6 +185,7 @@ impl Simulation {
         state.velocity.fill(0.0);
         state.history = History::default();
         state.density.fill(0.0);
+        state.tensions.fill(0.0);
         state.control = Control::default();
         rebase(&mut state.frames, network.edges(), nodes);
         if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
@@ -300,6 +301,7 @@ impl Simulation {
         let order = state.history.guess_order();
         state.history.extrapolate(order, (t0, &state.q), |sample| &sample.q, t1, &mut guess.q);
         state.history.extrapolate(order, (t0, &state.density), |sample| &sample.density, t1, &mut guess.density);
+        guess.tensions.copy_from_slice(&state.tensions);
         let target = &mut guess.q;
         for clamp in &self.model.clamps {
             for &dof in &clamp.nodes {
@@ -357,7 +359,11 @@ impl Simulation {
         balance.node_stiffness(model, &step, stiffness);
         place(&state.q, positions);
         let mut violation = f64::INFINITY;
-        let rough = NewtonSettings { tolerance: settings.tolerance.max(ROUGH_TOLERANCE), ..*settings };
+        let rough = match settings.goal {
+            Goal::Residual(tolerance) => Goal::Residual(tolerance.max(ROUGH_TOLERANCE)),
+            goal @ Goal::Displacement(_) => goal,
+        };
+        let rough = NewtonSettings { goal: rough, ..*settings };
         // While contact forces are being found, the balance between passes need not be solved to the last digit.
         let mut settled = contact.forces().is_empty();
         for _ in 0..law.max_iterations() {
@@ -397,6 +403,7 @@ impl Simulation {
             velocity: std::mem::replace(&mut state.velocity, velocity),
             density: std::mem::replace(&mut state.density, self.trial.density.clone()),
         };
+        state.tensions.copy_from_slice(&self.trial.tensions);
         state.history.accept(replaced, missed);
         self.balance.configuration().accept(&mut state.frames);
         state.time += dt;

@@ -14,25 +14,19 @@
 
 use std::time::Instant;
 
-use super::balance::{Balance, Step, gather};
+use super::balance::{Balance, Step, Unknowns, gather};
 use super::model::Model;
 use super::statistics::Statistics;
 use crate::fluid::FluidModel;
 use crate::linear::LinearError;
 use crate::linear::dense::DenseLu;
 use crate::linear::krylov::LinearOperator;
-use crate::linear::ldlt::SparseLdlt;
-use crate::linear::pattern::Pattern;
-use crate::linear::sparse::SparseLu;
+use crate::linear::nearly_symmetric::NearlySymmetric;
 use crate::{Mat3, Vec3};
-
-/// Relative residual above which a factorization without pivoting is not trusted.
-const TRUSTED: f64 = 1e-3;
 
 /// Vectors of the linear solves.
 pub(super) struct Work {
     rhs: Vec<f64>,
-    check: Vec<f64>,
     seek: Vec<f64>,
     target: Vec<f64>,
     image: Vec<f64>,
@@ -44,7 +38,6 @@ impl Work {
     pub fn new(dofs: usize, flow: usize) -> Self {
         Self {
             rhs: vec![0.0; dofs],
-            check: vec![0.0; dofs],
             seek: vec![0.0; flow],
             target: vec![0.0; flow],
             image: vec![0.0; flow],
@@ -55,23 +48,60 @@ impl Work {
 }
 
 impl Balance {
-    /// Newton direction at the configuration of the last residual, in degrees of freedom and force density; `tolerance` is the
-    /// relative residual of the linear system.
+    /// Linearises the balance at the configuration of the last residual and the given tensions of edges, and factors its
+    /// sparse part.
+    pub fn linearize(
+        &mut self,
+        model: &Model,
+        step: &Step,
+        tensions: &[f64],
+        statistics: &mut Statistics,
+    ) -> Result<(), LinearError> {
+        let start = Instant::now();
+        self.differentiate(model, step, tensions);
+        let assembled = Instant::now();
+        statistics.seconds_assembly += (assembled - start).as_secs_f64();
+        self.system.values_mut().copy_from_slice(&self.jacobian);
+        let factored = self.system.factor();
+        statistics.seconds_linear += assembled.elapsed().as_secs_f64();
+        factored
+    }
+
+    /// Newton direction for the last residual, from the given tensions of edges; `tolerance` is the relative residual of the
+    /// linear system.
     pub fn direction(
         &mut self,
         model: &Model,
         step: &Step,
+        tensions: &[f64],
         tolerance: f64,
-        (moved, density): (&mut [f64], &mut [f64]),
+        out: &mut Unknowns,
         statistics: &mut Statistics,
     ) -> Result<(), LinearError> {
         let start = Instant::now();
-        self.differentiate(model, step);
-        let assembled = Instant::now();
-        statistics.seconds_assembly += (assembled - start).as_secs_f64();
-        let solved = self.solve(model, step, tolerance, (moved, density), statistics);
-        statistics.seconds_linear += assembled.elapsed().as_secs_f64();
+        let solved = self.solve(model, step, tolerance, out, statistics);
+        model.stretching.tension_changes(&self.configuration, &out.q, tensions, &mut out.tensions);
+        statistics.seconds_linear += start.elapsed().as_secs_f64();
         solved
+    }
+
+    /// Largest displacement, m, by which the last residual would be corrected were the fluid's resistance local, with the
+    /// factors of the last linearisation.
+    pub fn correction(&mut self, model: &Model, step: &Step, statistics: &mut Statistics) -> Result<f64, LinearError> {
+        let start = Instant::now();
+        self.work.rhs.iter_mut().zip(&self.residual).for_each(|(rhs, residual)| *rhs = -residual);
+        let Self { system, fluid, fluid_dofs, slip, work, .. } = self;
+        let Work { rhs, seek, moved, .. } = work;
+        if let Some(fluid) = implicit_nonlocal(fluid, step) {
+            seek.iter_mut().zip(slip.iter()).for_each(|(seek, slip)| *seek = -slip);
+            let scale = fluid.nonlocal().map_or(1.0, |mobility| mobility.scale());
+            resist_locally(model, fluid, fluid_dofs, scale, seek, rhs);
+        }
+        let solved = system.solve_checked(rhs, moved);
+        let lengths = moved.iter().zip(&model.force_weight).map(|(moved, weight)| moved.abs() / weight);
+        let largest = lengths.fold(0.0, f64::max);
+        statistics.seconds_linear += start.elapsed().as_secs_f64();
+        solved.map(|()| largest)
     }
 
     fn solve(
@@ -79,99 +109,52 @@ impl Balance {
         model: &Model,
         step: &Step,
         tolerance: f64,
-        (moved, density): (&mut [f64], &mut [f64]),
+        out: &mut Unknowns,
         statistics: &mut Statistics,
     ) -> Result<(), LinearError> {
         self.work.rhs.iter_mut().zip(&self.residual).for_each(|(rhs, residual)| *rhs = -residual);
-        let Self { jacobian, ldlt, lu, gmres, fluid, fluid_dofs, slip, work, .. } = self;
-        let mut sparse = Sparse { ldlt, lu, pivoted: false };
-        sparse.factor(&model.pattern, jacobian, &work.rhs, &mut work.check)?;
-        let implicit = step.scheme.fluid_is_implicit();
-        let Some(fluid) = fluid.as_deref_mut().filter(|fluid| implicit && !fluid.is_local()) else {
-            moved.copy_from_slice(&work.rhs);
-            sparse.solve(moved)?;
-            return sparse.refine(&model.pattern, jacobian, &work.rhs, moved, &mut work.check);
+        let Self { system, gmres, fluid, fluid_dofs, slip, work, .. } = self;
+        let Some(fluid) = implicit_nonlocal(fluid, step) else {
+            return system.solve_refined(&work.rhs, &mut out.q);
         };
-        let Work { rhs, seek, target, image, moved: trial, density: density_trial, .. } = work;
-        let mut system = FluidSystem {
-            model,
-            rate: step.rate,
-            sparse,
-            fluid,
-            fluid_dofs,
-            rhs: None,
-            moved: trial,
-            density: density_trial,
-        };
+        let Work { rhs, seek, target, image, moved, density } = work;
         // The image of b = 0 carries the force balance's own right-hand side.
-        system.rhs = Some(rhs);
+        system.solve_checked(rhs, moved)?;
+        let mut fluid_system =
+            FluidSystem { model, rate: step.rate, sparse: system, fluid, fluid_dofs, rhs: Some(rhs), moved, density };
         seek.fill(0.0);
-        system.image(seek, image)?;
-        system.rhs = None;
+        fluid_system.finish(seek, image)?;
+        fluid_system.rhs = None;
         target.iter_mut().zip(slip.iter()).zip(image.iter()).for_each(|((t, slip), image)| *t = -slip - image);
-        match gmres.solve(&mut system, target, seek, tolerance) {
+        match gmres.solve(&mut fluid_system, target, seek, tolerance) {
             Ok(iterations) => statistics.krylov_iterations += iterations as u64,
             Err(_) => {
                 statistics.dense_solves += 1;
-                system.solve_densely(target, seek)?;
+                fluid_system.solve_densely(target, seek)?;
             }
         }
-        system.rhs = Some(rhs);
-        system.image(seek, image)?;
-        moved.copy_from_slice(system.moved);
-        density.copy_from_slice(system.density);
+        fluid_system.rhs = Some(rhs);
+        fluid_system.image(seek, image)?;
+        out.q.copy_from_slice(fluid_system.moved);
+        out.density.copy_from_slice(fluid_system.density);
         Ok(())
     }
 }
 
-/// The sparse matrix, factored without pivoting as long as that can be trusted.
-struct Sparse<'a> {
-    ldlt: &'a mut SparseLdlt,
-    lu: &'a mut SparseLu,
-    pivoted: bool,
+/// The fluid, if its equation is one of the unknowns'.
+fn implicit_nonlocal<'a>(
+    fluid: &'a mut Option<Box<dyn FluidModel>>,
+    step: &Step,
+) -> Option<&'a mut (dyn FluidModel + 'static)> {
+    let implicit = step.scheme.fluid_is_implicit();
+    fluid.as_deref_mut().filter(|fluid| implicit && !fluid.is_local())
 }
 
-impl Sparse<'_> {
-    fn factor(&mut self, pattern: &Pattern, values: &[f64], rhs: &[f64], check: &mut [f64]) -> Result<(), LinearError> {
-        let trusted = self.ldlt.factor(pattern, values).is_ok() && self.is_trusted(pattern, values, rhs, check);
-        if !trusted {
-            self.pivoted = true;
-            self.lu.factor(pattern, values)?;
-        }
-        Ok(())
-    }
-
-    /// The matrix is symmetric but for the head's couple; what matters is that its factors reproduce a solution.
-    fn is_trusted(&mut self, pattern: &Pattern, values: &[f64], rhs: &[f64], check: &mut [f64]) -> bool {
-        let mut x = rhs.to_vec();
-        if self.ldlt.solve(&mut x).is_err() {
-            return false;
-        }
-        check.iter_mut().zip(rhs).for_each(|(check, rhs)| *check = -rhs);
-        pattern.multiply_add(values, &x, check);
-        let size = |v: &[f64]| v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        size(check) <= TRUSTED * size(rhs)
-    }
-
-    fn solve(&mut self, x: &mut [f64]) -> Result<(), LinearError> {
-        if self.pivoted { self.lu.solve(x) } else { self.ldlt.solve(x) }
-    }
-
-    /// One step of iterative refinement, for the part of the matrix that is not symmetric.
-    fn refine(
-        &mut self,
-        pattern: &Pattern,
-        values: &[f64],
-        rhs: &[f64],
-        x: &mut [f64],
-        check: &mut [f64],
-    ) -> Result<(), LinearError> {
-        let minus: Vec<f64> = x.iter().map(|value| -value).collect();
-        check.copy_from_slice(rhs);
-        pattern.multiply_add(values, &minus, check);
-        self.solve(check)?;
-        x.iter_mut().zip(check.iter()).for_each(|(value, change)| *value += change);
-        Ok(())
+/// `out -= R b / s` at the nodes that are free to move.
+fn resist_locally(model: &Model, fluid: &dyn FluidModel, dofs: &[usize], scale: f64, b: &[f64], out: &mut [f64]) {
+    for ((&dof, block), b) in dofs.iter().zip(fluid.local()).zip(b.chunks_exact(3)) {
+        let force = block * Vec3::new(b[0], b[1], b[2]) / scale;
+        (0..3).filter(|&c| !model.prescribed[dof + c]).for_each(|c| out[dof + c] -= force[c]);
     }
 }
 
@@ -179,7 +162,7 @@ impl Sparse<'_> {
 struct FluidSystem<'a> {
     model: &'a Model,
     rate: f64,
-    sparse: Sparse<'a>,
+    sparse: &'a mut NearlySymmetric,
     fluid: &'a mut (dyn FluidModel + 'static),
     fluid_dofs: &'a [usize],
     /// Right-hand side of the force balance; none in the homogeneous system.
@@ -196,13 +179,15 @@ impl FluidSystem<'_> {
             None => self.moved.fill(0.0),
         }
         let scale = self.fluid.nonlocal().map_or(1.0, |mobility| mobility.scale());
-        let prescribed = &self.model.prescribed;
-        for ((&dof, block), b) in self.fluid_dofs.iter().zip(self.fluid.local()).zip(b.chunks_exact(3)) {
-            let force = block * Vec3::new(b[0], b[1], b[2]) / scale;
-            (0..3).filter(|&c| !prescribed[dof + c]).for_each(|c| self.moved[dof + c] -= force[c]);
-        }
+        resist_locally(self.model, self.fluid, self.fluid_dofs, scale, b, self.moved);
         self.sparse.solve(self.moved)?;
-        let moved = &*self.moved;
+        self.finish(b, image)
+    }
+
+    /// The image for a solution of the force balance that is known already.
+    fn finish(&mut self, b: &[f64], image: &mut [f64]) -> Result<(), LinearError> {
+        let scale = self.fluid.nonlocal().map_or(1.0, |mobility| mobility.scale());
+        let (moved, prescribed) = (&*self.moved, &self.model.prescribed);
         gather(self.fluid_dofs, |dof| if prescribed[dof] { 0.0 } else { moved[dof] }, image);
         for (k, block) in self.fluid.local().iter().enumerate() {
             let block: &Mat3 = block;

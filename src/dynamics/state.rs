@@ -19,6 +19,8 @@ pub struct State {
     pub velocity: Vec<f64>,
     /// Force density on the fluid at the immersed nodes, N/m; empty unless the fluid is nonlocal and implicit.
     pub density: Vec<f64>,
+    /// Tensions of edges, N, with which the next step's equations are linearised.
+    pub tensions: Vec<f64>,
     /// Size and order of the next adaptive step.
     pub control: Control,
     /// States before this one, for the next guess.

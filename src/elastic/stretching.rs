@@ -25,6 +25,55 @@ impl Stretching {
             .collect();
         Self { elements, stiffness, rest_lengths }
     }
+
+    fn tension(&self, configuration: &Configuration, edge: usize) -> f64 {
+        self.stiffness[edge] * (configuration.length(edge) / self.rest_lengths[edge] - 1.0)
+    }
+
+    /// Adds the residual, and the derivative as if the tensions that turn with the edges were the given ones (N, by edge).
+    ///
+    /// Newton's method on tensions as unknowns beside the positions has this matrix, once the tensions are eliminated. Those
+    /// of a guess that stretches the edges spuriously would make a filament that is nearly inextensible buckle in the
+    /// linear system.
+    pub fn add_with_tensions(&self, configuration: &Configuration, tensions: &[f64], out: &mut Assembly) {
+        self.add_turning(configuration, |k| tensions[k], out);
+    }
+
+    /// By how much a displacement of the degrees of freedom, to first order, changes the given tensions, N.
+    pub fn tension_changes(&self, configuration: &Configuration, moved: &[f64], tensions: &[f64], out: &mut [f64]) {
+        for (k, element) in self.elements.iter().enumerate() {
+            let t = configuration.tangent(k);
+            let relative: f64 = (0..3).map(|c| t[c] * (moved[element.dofs[3 + c]] - moved[element.dofs[c]])).sum();
+            let linear = self.tension(configuration, k) + self.stiffness[k] * relative / self.rest_lengths[k];
+            out[k] = linear - tensions[k];
+        }
+    }
+
+    fn add_turning(&self, configuration: &Configuration, turning: impl Fn(usize) -> f64, out: &mut Assembly) {
+        for (k, element) in self.elements.iter().enumerate() {
+            let (length, rest, stiffness) = (configuration.length(k), self.rest_lengths[k], self.stiffness[k]);
+            let t = configuration.tangent(k);
+            let pull = t * self.tension(configuration, k);
+            let gradient = [-pull.x, -pull.y, -pull.z, pull.x, pull.y, pull.z];
+            if out.jacobian.is_none() {
+                element.add(&gradient, None, out);
+                continue;
+            }
+            let along = t * t.transpose();
+            let block = along * (stiffness / rest) + (Mat3::identity() - along) * (turning(k) / length);
+            let mut matrix = [0.0; 36];
+            for i in 0..3 {
+                for j in 0..3 {
+                    let value = block[(i, j)];
+                    matrix[i + 6 * j] = value;
+                    matrix[i + 3 + 6 * (j + 3)] = value;
+                    matrix[i + 3 + 6 * j] = -value;
+                    matrix[i + 6 * (j + 3)] = -value;
+                }
+            }
+            element.add(&gradient, Some(&matrix), out);
+        }
+    }
 }
 
 impl Term for Stretching {
@@ -50,29 +99,6 @@ impl Term for Stretching {
     }
 
     fn add(&self, configuration: &Configuration, _: &Increment, out: &mut Assembly) {
-        for (k, element) in self.elements.iter().enumerate() {
-            let (length, rest, stiffness) = (configuration.length(k), self.rest_lengths[k], self.stiffness[k]);
-            let t = configuration.tangent(k);
-            let tension = stiffness * (length / rest - 1.0);
-            let pull = t * tension;
-            let gradient = [-pull.x, -pull.y, -pull.z, pull.x, pull.y, pull.z];
-            if out.jacobian.is_none() {
-                element.add(&gradient, None, out);
-                continue;
-            }
-            let along = t * t.transpose();
-            let block = along * (stiffness / rest) + (Mat3::identity() - along) * (tension / length);
-            let mut matrix = [0.0; 36];
-            for i in 0..3 {
-                for j in 0..3 {
-                    let value = block[(i, j)];
-                    matrix[i + 6 * j] = value;
-                    matrix[i + 3 + 6 * (j + 3)] = value;
-                    matrix[i + 3 + 6 * j] = -value;
-                    matrix[i + 6 * (j + 3)] = -value;
-                }
-            }
-            element.add(&gradient, Some(&matrix), out);
-        }
+        self.add_turning(configuration, |k| self.tension(configuration, k), out);
     }
 }

@@ -2,12 +2,15 @@
 //!
 //! * [`pattern`]: which entries a sum of small dense element matrices touches, and where each of them is stored.
 //! * [`sparse`]: LU of a matrix on such a pattern (faer).
+//! * [`ldlt`]: LDL^T of a symmetric one (faer).
+//! * [`nearly_symmetric`]: the one of these two that a matrix needs.
 //! * [`dense`]: LU of a dense unsymmetric matrix (faer).
 //! * [`krylov`]: right-preconditioned GMRES for operators that are only known by their action.
 
 pub mod dense;
 pub mod krylov;
 pub mod ldlt;
+pub mod nearly_symmetric;
 pub mod pattern;
 pub mod sparse;
 

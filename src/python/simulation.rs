@@ -75,7 +75,7 @@ impl Simulation {
 
     /// Local error (m) that adaptive steps keep to, and the relative residual they are solved to; fixed steps without.
     #[pyo3(signature = (tolerance=None))]
-    fn set_tolerance(&mut self, tolerance: Option<(f64, f64)>) {
+    fn set_tolerance(&mut self, tolerance: Option<f64>) {
         self.inner.set_tolerance(tolerance);
     }
 
@@ -286,6 +286,7 @@ impl Simulation {
                 .reshape([past.len(), width])
         };
         out.set_item("density", PyArray1::from_slice(py, &state.density))?;
+        out.set_item("tensions", PyArray1::from_slice(py, &state.tensions))?;
         out.set_item("control_step", PyArray1::from_slice(py, &[state.control.dt]))?;
         out.set_item("control_order", PyArray1::from_slice(py, &[state.control.order as u64]))?;
         out.set_item("history_times", PyArray1::from_iter(py, past.iter().map(|sample| sample.time)))?;
@@ -312,6 +313,7 @@ impl Simulation {
             q: values(&saved.q),
             velocity: values(&saved.velocity),
             density: values(&saved.density),
+            tensions: values(&saved.tensions),
             control: Control { dt: first(&saved.control_step), order: whole(&saved.control_order) },
             history: History { past: past(&saved), order: whole(&saved.history_order) },
             frames: ReferenceFrames {
@@ -335,6 +337,7 @@ impl Simulation {
             && state.frames.twists.len() == current.frames.twists.len()
             && state.motor_angles.len() == current.motor_angles.len()
             && state.density.len() == flow
+            && state.tensions.len() == current.tensions.len()
             && saved.history_states.shape() == [state.history.past.len(), current.q.len()]
             && saved.history_velocities.shape() == [state.history.past.len(), current.q.len()]
             && saved.history_densities.shape() == [state.history.past.len(), kept];
@@ -344,8 +347,10 @@ impl Simulation {
             && pairs.nrows() == saved.contact_forces.as_array().len()
             && pairs.iter().all(|&edge| usize::try_from(edge).is_ok_and(|edge| edge < edges));
         let past = state.history.past.iter();
-        let finite = [&state.q, &state.velocity, &state.density, &state.frames.twists, &state.motor_angles]
+        let present = [&state.q, &state.velocity, &state.density, &state.tensions];
+        let finite = present
             .into_iter()
+            .chain([&state.frames.twists, &state.motor_angles])
             .chain(past.flat_map(|sample| [&sample.q, &sample.velocity, &sample.density]))
             .flatten()
             .chain(state.contacts.iter().map(|(_, force)| force))
@@ -369,6 +374,7 @@ struct StateInput<'py> {
     q: PyReadonlyArray1<'py, f64>,
     velocity: PyReadonlyArray1<'py, f64>,
     density: PyReadonlyArray1<'py, f64>,
+    tensions: PyReadonlyArray1<'py, f64>,
     control_step: PyReadonlyArray1<'py, f64>,
     control_order: PyReadonlyArray1<'py, u64>,
     history_times: PyReadonlyArray1<'py, f64>,
