@@ -8,7 +8,7 @@ apart by speed, head rate and torque of the robot, because their nodes differ.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -152,37 +152,62 @@ def time_steps(studies: Mapping[str, tuple[list[Result], float]]) -> str:
     return f"{table(head, rows)}\n\nThe references move by this much from rtol 1e-6 to 1e-7: {errors}."
 
 
-def robot_measures(**options: Any) -> tuple[float, float, float]:
-    """Return swimming speed [m/s], head rate [rad/s] and motor torque [N m] of the robot at 20 rpm, late."""
+@dataclass(frozen=True)
+class Measures:
+    """The robot at 20 rpm, late: speed [m/s], head rate [rad/s], motor torque [N m]; and what the run cost."""
+
+    values: tuple[float, float, float]
+    seconds: float
+    nodes: int
+
+
+def robot_measures(**options: Any) -> Measures:
     scene = flagrs.scenarios.robot(rpm=20.0, **options)
-    trajectory = flagrs.Simulation(scene, threads=1, rtol=1e-4).run(30.0, 0.1, path=False)
+    simulation = flagrs.Simulation(scene, threads=1, rtol=1e-4)
+    trajectory = simulation.run(30.0, 0.1, path=False)
     torque = float(trajectory.torque()[trajectory.time > 18.0].mean())
-    return trajectory.swimming_speed(start=18.0), trajectory.head_rate(start=18.0), torque
+    values = (trajectory.swimming_speed(start=18.0), trajectory.head_rate(start=18.0), torque)
+    return Measures(values, simulation.statistics["seconds_total"] / 30.0, scene.node_count)
 
 
 def mesh_and_fluid() -> str:
     """Return what mesh, regularization and fluid model are worth on the robot."""
-    cases: dict[str, dict[str, Any]] = {
-        f"edges of {1e3 * edge:g} mm": {"edge_length": edge} for edge in (9e-3, 7e-3, 5e-3, 3.5e-3, 2.5e-3)
+    edges = (9e-3, 7e-3, 5e-3, 3.5e-3, 2.5e-3)
+    models: dict[str, dict[str, Any]] = {
+        "seed's epsilon": {},
+        "epsilon = sqrt(e) a": {"fluid": {"epsilon": "slender"}},
+        "no twist drag": {"twist_drag": False},
+        "RFT, Gray-Hancock": {"fluid": {"model": "RFT"}},
     }
-    cases["epsilon = sqrt(e) a"] = {"fluid": {"epsilon": "slender"}}
-    cases["no twist drag"] = {"twist_drag": False}
-    cases["RFT, Gray-Hancock"] = {"fluid": {"model": "RFT"}}
-    measured = {name: robot_measures(**options) for name, options in cases.items()}
-    finest = measured["edges of 2.5 mm"]
-    rows = [
-        [
-            name,
-            f"{1e3 * speed:.4f}",
-            f"{rate:.5f}",
-            f"{1e6 * torque:.2f}",
-            *(f"{100.0 * (value / best - 1.0):+.1f} %" for value, best in zip((speed, rate, torque), finest)),
-        ]
-        for name, (speed, rate, torque) in measured.items()
-    ]
-    head = ("robot at 20 rpm", "speed [mm/s]", "head [rad/s]", "torque [uN m]", "speed", "head", "torque")
-    note = "The last three columns are relative to edges of 2.5 mm; models are compared at 5 mm."
-    return f"{table(head, rows)}\n\n{note}"
+    rows: list[list[str]] = []
+    ours: list[float] = []
+    for name, options in models.items():
+        measured = {edge: robot_measures(edge_length=edge, **options) for edge in edges}
+        # First order in the edge, from the finest mesh and the one with edges twice as long.
+        limit = [2.0 * fine - coarse for fine, coarse in zip(measured[2.5e-3].values, measured[5e-3].values)]
+        ours = ours or limit
+        rows += [_robot_row(f"{name}, {1e3 * edge:g} mm", found, limit) for edge, found in measured.items()]
+        rows.append([f"{name}, edges to zero", "", "", *_shown(limit), *_apart(limit, ours)])
+    head = ("robot at 20 rpm", "nodes", "ms per simulated s", "speed [mm/s]", "head [rad/s]", "torque [uN m]")
+    note = (
+        "The last three columns compare speed, head rate and torque: of a mesh with the same model's limit for "
+        "edges to zero (extrapolated from 5 and 2.5 mm), and of a model's limit with that of the seed's epsilon."
+    )
+    return f"{table((*head, 'speed', 'head', 'torque'), rows)}\n\n{note}"
+
+
+def _robot_row(name: str, found: Measures, limit: Sequence[float]) -> list[str]:
+    cost = [str(found.nodes), f"{1e3 * found.seconds:.1f}"]
+    return [name, *cost, *_shown(found.values), *_apart(found.values, limit)]
+
+
+def _shown(values: Sequence[float]) -> list[str]:
+    speed, rate, torque = values
+    return [f"{1e3 * speed:.4f}", f"{rate:.5f}", f"{1e6 * torque:.2f}"]
+
+
+def _apart(values: Sequence[float], reference: Sequence[float]) -> list[str]:
+    return [f"{100.0 * (value / best - 1.0):+.1f} %" for value, best in zip(values, reference)]
 
 
 def draw(studies: Mapping[str, tuple[list[Result], float]]) -> None:

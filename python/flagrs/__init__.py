@@ -15,6 +15,7 @@ from flagrs.scene import (
     Table,
 )
 from flagrs.simulation import Simulation
+from flagrs.suggest import Suggestion, suggest
 from flagrs.trajectory import Trajectory
 from flagrs.units import rpm
 
@@ -32,10 +33,12 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
+    "Suggestion",
     "Table",
     "Trajectory",
     "contact",
     "fluid",
     "rpm",
     "scenarios",
+    "suggest",
 ]

@@ -17,6 +17,7 @@ from flagrs.errors import FlagrsError, SceneError
 from flagrs.progress import ProgressBar
 from flagrs.runs import Run, RunSettings, measured, run_to_file
 from flagrs.scene import Scene, toml
+from flagrs.suggest import suggest
 from flagrs.trajectory import Trajectory
 from flagrs.units import rpm
 
@@ -78,6 +79,19 @@ def run(
     typer.echo(_report(done, path))
     if figure is not None:
         _draw(done.trajectory, figure)
+
+
+@app.command("suggest")
+def suggest_settings(
+    scene: Annotated[str, typer.Argument(help="A TOML file, or the name of a scenario.")],
+    error: Annotated[float, typer.Option(help="Relative error wanted.")] = 1e-2,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Parameter or field to change, such as rpm=30; repeatable."),
+    ] = None,
+) -> None:
+    """Say with which settings a scene is simulated to an error, and what no setting cures."""
+    typer.echo(suggest(scene_from(scene, changes or []), error))
 
 
 @app.command()
