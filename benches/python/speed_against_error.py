@@ -154,7 +154,7 @@ def time_steps(studies: Mapping[str, tuple[list[Result], float]]) -> str:
 
 @dataclass(frozen=True)
 class Measures:
-    """The robot at 20 rpm, late: speed [m/s], head rate [rad/s], motor torque [N m]; and what the run cost."""
+    """Speed [m/s], head rate [rad/s] and motor torque [N m] of the robot, late; and what the run cost."""
 
     values: tuple[float, float, float]
     seconds: float
@@ -190,8 +190,9 @@ def mesh_and_fluid() -> str:
         rows.append([f"{name}, edges to zero", "", "", *_shown(limit), *_apart(limit, ours)])
     head = ("robot at 20 rpm", "nodes", "ms per simulated s", "speed [mm/s]", "head [rad/s]", "torque [uN m]")
     note = (
-        "The last three columns compare speed, head rate and torque: of a mesh with the same model's limit for "
-        "edges to zero (extrapolated from 5 and 2.5 mm), and of a model's limit with that of the seed's epsilon."
+        "The last three columns compare speed, head rate and torque: of a mesh with the same model's limit "
+        "for edges to zero (extrapolated from 5 and 2.5 mm), and of a model's limit with that of the seed's "
+        "epsilon."
     )
     return f"{table((*head, 'speed', 'head', 'torque'), rows)}\n\n{note}"
 
