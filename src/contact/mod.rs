@@ -8,7 +8,11 @@
 //! models stand on top of these three and add the mechanics. Lengths are in metres, but every
 //! decision is relative to the sizes at hand: nothing depends on the unit.
 
+pub mod angle;
+pub mod barrier;
 pub mod broad_phase;
 pub mod distance;
 pub mod exclusion;
+pub mod pair;
+pub mod separation;
 pub mod spillmann;
