@@ -71,10 +71,6 @@ impl Barrier {
         }
         let y = room / gap;
         let log = y.ln_1p();
-        BarrierValue {
-            value: room * room * log,
-            slope: -room * (2.0 * log + y),
-            curvature: 2.0 * log + y * (4.0 + y),
-        }
+        BarrierValue { value: room * room * log, slope: -room * (2.0 * log + y), curvature: 2.0 * log + y * (4.0 + y) }
     }
 }

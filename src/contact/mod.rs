@@ -10,9 +10,14 @@
 
 pub mod angle;
 pub mod barrier;
+pub mod bodies;
 pub mod broad_phase;
+pub mod candidates;
+pub mod continuous;
 pub mod distance;
 pub mod exclusion;
+pub mod friction;
 pub mod pair;
+pub mod potential;
 pub mod separation;
 pub mod spillmann;
