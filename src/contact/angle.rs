@@ -1,50 +1,59 @@
 //! How the angle between two edges shares their contact between a point and a line.
 //!
 //! Rods that cross touch at a point, rods that lie along each other on a line. Both are the integral of the barrier along the
-//! rods, `int b(D(x)) dx`. Where the edges cross at an angle `theta` it is taken at the closest points, times the length over
-//! which the rods stay in range, `xi sqrt(2 delta) / sin theta` (to either side of rods at `D = xi`); where they are nearly
-//! parallel, closest points jump from end to end, and it is summed over the nodes. With `c = sin^2 theta` (edge vectors over rest
-//! lengths) and `eps = 1e-3` (1.8 degrees) the weights of point and line are
+//! rods, `int b(D(x)) dx`. Rods at `D = xi` that cross at an angle `theta` stay in range over the length `reach / sin theta`
+//! to either side, `reach = xi sqrt(2 delta)`. Where this is shorter than an edge, the nodes may miss it, and the integral is
+//! taken as the barrier at the closest points times that length. Where it is longer, closest points say little (they jump from
+//! end to end when the edges become parallel), and the integral is summed over the nodes. With `c = sin^2 theta` (edge vectors
+//! over rest lengths) the weights of point, in units of `reach`, and of line are
 //!
 //! ```text
-//!   phi(c) = m(c) / sqrt(c + eps / 10)   (times xi sqrt(2 delta)),      1 - m(c),      m(c) = (2 - c / eps) c / eps, 1 from eps on.
+//!   phi(c) = m(c) / sqrt(c + eps / 10),      1 - m(c),
+//!   m(c) = (3 - 2 c / eps) (c / eps)^2,  1 from eps on,      eps = min((reach / l)^2, 1/2)
 //! ```
 //!
-//! `m` is the mollifier of Li et al. (2020), equation 24. `phi` is proportional to `c` where the edges are parallel, which keeps
-//! energy and gradient of the pair continuous there.
+//! with `l` the longer rest length. Since `phi` falls as `c^2` and the second derivative of a distance grows as `1 / c`, the
+//! energy is twice differentiable where edges are parallel. The mollifier of Li et al. (2020), equation 24, falls as `c` only:
+//! second derivatives then jump at parallel edges, and are so large nearby that Newton's steps become short.
 
 use crate::{Mat3, Vec3};
 
 use super::separation::{Gradient12, Hessian12};
 
-/// `sin^2` of the angle above which an edge pair touches at a point only (1.8 degrees).
-const PARALLEL_SIN2: f64 = 1e-3;
+/// Greatest `eps`, for edges shorter than `reach`: those that cross at more than 45 degrees touch at a point on any mesh.
+const GREATEST: f64 = 0.5;
 
-/// Where the growth of the point's weight towards parallel ends, over [`PARALLEL_SIN2`]: the sum of both parts then follows
-/// the integral to 10 % from one regime to the other.
+/// Where the growth of the point's weight towards parallel ends, over `eps`: the sum of both parts then follows the integral
+/// from one regime to the other.
 const ROUNDING: f64 = 0.1;
 
 /// A function of `c` with its first two derivatives.
 pub type Derivatives = [f64; 3];
 
+/// `eps` of two edges in range of each other over `reach`, with rest lengths in the same unit.
+pub fn widest_parallel(reach: f64, rest_lengths: [f64; 2]) -> f64 {
+    let ratio = reach / rest_lengths[0].max(rest_lengths[1]);
+    (ratio * ratio).min(GREATEST)
+}
+
 /// The weight `m / sqrt(c + eps / 10)` of the closest points and the weight `1 - m` of the nodes.
 #[inline]
-pub fn shares(c: f64) -> (Derivatives, Derivatives) {
-    let m = mollifier(c);
-    let base = c + ROUNDING * PARALLEL_SIN2;
-    let root = base.powf(-0.5);
+pub fn shares(c: f64, eps: f64) -> (Derivatives, Derivatives) {
+    let m = mollifier(c, eps);
+    let base = c + ROUNDING * eps;
+    let root = base.sqrt().recip();
     let (slope, curvature) = (-0.5 * root / base, 0.75 * root / (base * base));
     let point = [m[0] * root, m[1] * root + m[0] * slope, m[2] * root + 2.0 * m[1] * slope + m[0] * curvature];
     (point, [1.0 - m[0], -m[1], -m[2]])
 }
 
 #[inline]
-fn mollifier(c: f64) -> Derivatives {
-    let x = c / PARALLEL_SIN2;
+fn mollifier(c: f64, eps: f64) -> Derivatives {
+    let x = c / eps;
     if x >= 1.0 {
         return [1.0, 0.0, 0.0];
     }
-    [(2.0 - x) * x, 2.0 * (1.0 - x) / PARALLEL_SIN2, -2.0 / (PARALLEL_SIN2 * PARALLEL_SIN2)]
+    [x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / eps, 6.0 * (1.0 - 2.0 * x) / (eps * eps)]
 }
 
 /// `c = |u x v|^2` of two edges, with `u = (a1 - a0) / rest length` and `v = (b1 - b0) / rest length`.

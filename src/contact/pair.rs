@@ -26,7 +26,7 @@
 
 use nalgebra::SymmetricEigen;
 
-use super::angle::{Angle, Derivatives, shares};
+use super::angle::{Angle, Derivatives, shares, widest_parallel};
 use super::barrier::{Barrier, BarrierValue};
 use super::separation::{Gradient12, Hessian12, Separation};
 use crate::Vec3;
@@ -194,7 +194,7 @@ impl Pair {
             return Blend { angle: None, point: [self.reach, 0.0, 0.0], line: [0.0; 3] };
         };
         let angle = Angle::new(x, rest_lengths);
-        let (point, line) = shares(angle.sin2());
+        let (point, line) = shares(angle.sin2(), widest_parallel(self.reach, rest_lengths));
         Blend { angle: Some(angle), point: point.map(|part| part * self.reach), line }
     }
 
