@@ -125,6 +125,25 @@ impl BroadPhase {
         &self.candidates
     }
 
+    /// The pairs `[i, j]`, `i < j`, in ascending order, that may touch on the way from `from` to `to`: every pair of active, not
+    /// excluded edges whose capsules of radius `radius[e]` (m) touch while each node goes along a straight path between them.
+    ///
+    /// # Panics
+    /// If `radius` is not one per edge, or an edge names a node beyond `from` or `to`.
+    pub fn swept(&mut self, from: &[Vec3], to: &[Vec3], radius: &[f64]) -> &[[u32; 2]] {
+        assert_eq!(radius.len(), self.edges.len(), "one radius per edge");
+        fill_boxes(&mut self.boxes, &self.edges, from, radius, 0.0, PAD);
+        let start = std::mem::take(&mut self.boxes);
+        fill_boxes(&mut self.boxes, &self.edges, to, radius, 0.0, PAD);
+        for (bounds, start) in self.boxes.iter_mut().zip(&start) {
+            *bounds = Bounds { low: bounds.low.inf(&start.low), high: bounds.high.sup(&start.high) };
+        }
+        let mut found = std::mem::take(&mut self.candidates);
+        self.find_overlaps(&mut found);
+        self.candidates = found;
+        &self.candidates
+    }
+
     /// Forgets the last search, so that the next call makes a new one. Never needed for the result
     /// to be right.
     pub fn reset(&mut self) {
@@ -142,28 +161,35 @@ impl BroadPhase {
             .skin
             .unwrap_or_else(|| SKIN_PER_RADIUS * self.active.iter().map(|&e| radius[e as usize]).fold(0.0, f64::max));
         fill_boxes(&mut self.boxes, &self.edges, nodes, radius, margin + 0.5 * skin, SEARCH_PAD);
-        self.near.clear();
-        match self.search {
-            Search::BruteForce => self.compare_all_pairs(),
-            Search::Tree => self.descend_tree(),
-        }
-        self.near.sort_unstable();
+        let mut near = std::mem::take(&mut self.near);
+        self.find_overlaps(&mut near);
+        self.near = near;
         self.searches += 1;
         self.last = Some(LastSearch { nodes: nodes.to_vec(), radius: radius.to_vec(), margin, skin });
     }
 
-    fn compare_all_pairs(&mut self) {
+    /// All pairs of active, not excluded edges whose boxes overlap, in ascending order.
+    fn find_overlaps(&self, found: &mut Vec<[u32; 2]>) {
+        found.clear();
+        match self.search {
+            Search::BruteForce => self.compare_all_pairs(found),
+            Search::Tree => self.descend_tree(found),
+        }
+        found.sort_unstable();
+    }
+
+    fn compare_all_pairs(&self, found: &mut Vec<[u32; 2]>) {
         for (k, &i) in self.active.iter().enumerate() {
             let bounds = &self.boxes[i as usize];
             for &j in &self.active[k + 1..] {
                 if bounds.overlaps(&self.boxes[j as usize]) && !self.exclusion.excludes(i as usize, j as usize) {
-                    self.near.push([i, j]);
+                    found.push([i, j]);
                 }
             }
         }
     }
 
-    fn descend_tree(&mut self) {
+    fn descend_tree(&self, found: &mut Vec<[u32; 2]>) {
         // Leaves are numbered from 0 without gaps: parry 0.30 panics on one or two leaves numbered
         // otherwise.
         let leaves = self.active.iter().map(|&e| self.boxes[e as usize].as_parry()).enumerate();
@@ -171,7 +197,7 @@ impl BroadPhase {
         tree.traverse_bvtt_single_tree::<false>(&mut BvhWorkspace::default(), &mut |k, l| {
             let (i, j) = (self.active[k.min(l) as usize], self.active[k.max(l) as usize]);
             if !self.exclusion.excludes(i as usize, j as usize) {
-                self.near.push([i, j]);
+                found.push([i, j]);
             }
         });
     }

@@ -8,7 +8,16 @@
 //! models stand on top of these three and add the mechanics. Lengths are in metres, but every
 //! decision is relative to the sizes at hand: nothing depends on the unit.
 
+pub mod angle;
+pub mod barrier;
+pub mod bodies;
 pub mod broad_phase;
+pub mod candidates;
+pub mod continuous;
 pub mod distance;
 pub mod exclusion;
+pub mod friction;
+pub mod pair;
+pub mod potential;
+pub mod separation;
 pub mod spillmann;
