@@ -8,7 +8,8 @@ use flagrs::contact::spillmann::{ContactLaw, ContactSolver};
 use flagrs::dynamics::scheme::Scheme;
 use flagrs::dynamics::simulation::Simulation;
 use flagrs::dynamics::specification::{
-    ClampSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification, Specification,
+    ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
+    Specification,
 };
 use flagrs::elastic::signal::Signal;
 
@@ -40,8 +41,7 @@ fn crossed_rods(gap: f64) -> Specification {
         velocity: Vec3::zeros(),
     }];
     specification.contact = Some(ContactSpecification {
-        tolerance: TOLERANCE,
-        max_iterations: 500,
+        method: ContactMethodSpecification::SpillmannTeschner { tolerance: TOLERANCE, max_iterations: 500 },
         exclusion: std::f64::consts::FRAC_PI_2,
         colliding: vec![true; 20],
     });

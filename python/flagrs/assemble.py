@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flagrs.errors import SceneError
+from flagrs.contact_scales import barrier_stiffness, slip_velocity
+from flagrs.errors import SceneError, not_allowed
 from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology
 from flagrs.scene.signal import Signal
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
@@ -200,9 +201,19 @@ def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
 
 
 def _contact(scene: Scene, contact: Contact) -> dict[str, Any]:
+    spheres: list[tuple[int, float]] = []
+    if contact.head_radius is not None:
+        if scene.head is None:
+            raise not_allowed("contact.head_radius", contact.head_radius, "None in a scene without a head")
+        spheres = [(scene.node_offset(scene.head.rod) + scene.head.node, contact.head_radius)]
     return {
-        "tolerance": contact.tolerance,
+        "barrier": contact.method == "barrier",
+        "tolerance": contact.tolerance_or_default(),
         "max_iterations": contact.max_iterations,
+        "stiffness": barrier_stiffness(scene, contact),
+        "friction": contact.friction,
+        "slip_velocity": slip_velocity(scene, contact),
+        "spheres": spheres,
         "exclusion": EXCLUSION_FACTOR if contact.exclusion_factor is None else contact.exclusion_factor,
         "colliding": np.concatenate([rod.colliding_array() for rod in scene.rods]).tolist(),
     }

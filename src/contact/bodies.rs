@@ -3,6 +3,8 @@
 //! A sphere, such as a head, is an edge of no length whose two nodes are the same; broad phase, exclusion and distances then treat
 //! both alike. The edges come first.
 
+use std::fmt;
+
 use super::barrier::Barrier;
 use super::exclusion::Exclusion;
 use super::pair::Pair;
@@ -15,6 +17,15 @@ pub enum Body {
     Edge(usize),
     /// A sphere by its place in the list of spheres.
     Sphere(usize),
+}
+
+impl fmt::Display for Body {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Edge(edge) => write!(f, "edge {edge}"),
+            Self::Sphere(sphere) => write!(f, "sphere {sphere}"),
+        }
+    }
 }
 
 /// All edges and spheres of a scene; constant.
@@ -84,6 +95,14 @@ impl Bodies {
     /// What the body of an index is.
     pub fn body(&self, index: usize) -> Body {
         if index < self.edge_count { Body::Edge(index) } else { Body::Sphere(index - self.edge_count) }
+    }
+
+    /// The index of a body.
+    pub fn index(&self, body: Body) -> usize {
+        match body {
+            Body::Edge(edge) => edge,
+            Body::Sphere(sphere) => self.edge_count + sphere,
+        }
     }
 
     fn is_sphere(&self, index: usize) -> bool {

@@ -57,6 +57,11 @@ impl Candidates {
         changed
     }
 
+    /// Where the list was made, m; empty before the first search.
+    pub fn anchor(&self) -> &[Vec3] {
+        &self.positions
+    }
+
     /// How much further every node may move (m) before a pair outside the list can be in range; negative if that has happened.
     pub fn spare(&self, nodes: &[Vec3]) -> f64 {
         if nodes.len() != self.positions.len() {

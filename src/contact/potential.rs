@@ -72,6 +72,13 @@ impl Approach {
     }
 }
 
+impl ContactForce {
+    /// The two bodies in the numbering of the law's [`Bodies`].
+    pub fn indices(&self, law: &BarrierLaw) -> [u32; 2] {
+        self.bodies.map(|body| law.bodies.index(body) as u32)
+    }
+}
+
 /// A pair that pushes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactForce {
@@ -117,6 +124,16 @@ impl BarrierLaw {
         self.stiffness
     }
 
+    /// Tolerance `delta`.
+    pub fn delta(&self) -> f64 {
+        self.delta
+    }
+
+    /// Whether contacts resist sliding.
+    pub fn has_friction(&self) -> bool {
+        self.friction.is_some()
+    }
+
     /// What can touch.
     pub fn bodies(&self) -> &Bodies {
         &self.bodies
@@ -131,9 +148,22 @@ impl BarrierLaw {
     /// Makes the state's elements hold every pair in range of `nodes` (m), and says whether they have changed, and with them the
     /// stencils. Pairs with friction stay until [`Self::lag`] lets them go.
     pub fn ensure(&self, state: &mut BarrierState, nodes: &[Vec3]) -> bool {
-        if !state.candidates.ensure(&self.bodies, nodes) {
+        state.candidates.ensure(&self.bodies, nodes) && self.list_elements(state)
+    }
+
+    /// As [`Self::ensure`] for the nodes (m) at which another state had made its list: afterwards both have the same.
+    pub fn ensure_at(&self, state: &mut BarrierState, anchor: &[Vec3]) -> bool {
+        if state.candidates.anchor() == anchor {
             return false;
         }
+        state.candidates = Candidates::new(&self.bodies, self.delta, self.skin);
+        state.lagged.clear();
+        state.candidates.ensure(&self.bodies, anchor);
+        self.list_elements(state)
+    }
+
+    /// Makes elements of the near pairs and those with friction; whether they have changed.
+    fn list_elements(&self, state: &mut BarrierState) -> bool {
         let with_friction = state.lagged.iter().map(|lagged| lagged.bodies);
         let mut pairs: Vec<[usize; 2]> = state.candidates.pairs().iter().copied().chain(with_friction).collect();
         pairs.sort_unstable();
@@ -179,17 +209,20 @@ impl BarrierLaw {
         }
     }
 
-    /// Takes forces and directions of friction from `nodes` (m), in whose range the state must be ([`Self::ensure`]).
-    pub fn lag(&self, state: &mut BarrierState, nodes: &[Vec3]) {
+    /// Takes forces and directions of friction from `nodes` (m), in whose range the state must be ([`Self::ensure`]), and lets
+    /// go of pairs that are near no more; whether the elements have changed.
+    pub fn lag(&self, state: &mut BarrierState, nodes: &[Vec3]) -> bool {
         state.lagged.clear();
         if self.friction.is_none() {
-            return;
+            return false;
         }
+        let changed = self.list_elements(state);
         for (index, element) in state.elements.iter().enumerate() {
             if let Some(force) = self.force(element, nodes) {
                 state.lagged.push(Lagged { bodies: element.bodies, element: index, contact: force.lagged });
             }
         }
+        changed
     }
 
     /// Dissipation potential of friction (W) at the velocities of the nodes (m/s).
@@ -328,6 +361,11 @@ impl BarrierState {
     /// Distinct nodes of every element, in the order of its gradient and matrix.
     pub fn stencils(&self) -> impl Iterator<Item = &[usize]> {
         self.elements.iter().map(|element| &element.nodes[..element.count])
+    }
+
+    /// Where the list of near pairs was made, m.
+    pub fn anchor(&self) -> &[Vec3] {
+        self.candidates.anchor()
     }
 
     /// Number of searches through all pairs so far.

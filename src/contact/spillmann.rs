@@ -64,6 +64,11 @@ impl ContactLaw {
         self.tolerance
     }
 
+    /// Sum of the radii of a pair, m.
+    pub fn thickness(&self, [a, b]: [usize; 2]) -> f64 {
+        self.radius[a] + self.radius[b]
+    }
+
     fn closest(&self, [a, b]: [usize; 2], nodes: &[Vec3]) -> ClosestPoints {
         let ([a0, a1], [b0, b1]) = (self.edges[a], self.edges[b]);
         segment_distance(&nodes[a0], &nodes[a1], &nodes[b0], &nodes[b1])

@@ -14,6 +14,7 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
+use super::barrier_term::BarrierTerm;
 use super::model::Model;
 use super::predictor::derivative_weights;
 use super::scheme::Scheme;
@@ -120,6 +121,9 @@ pub(super) struct Balance {
     masked: Vec<usize>,
     diagonal: Vec<usize>,
     pub(super) system: NearlySymmetric,
+    /// Where the system stores the entries of the model's pattern; it may have more.
+    pub(super) embedding: Vec<u32>,
+    pub(super) barrier: Option<BarrierTerm>,
     pub(super) gmres: Gmres,
     pub(super) fluid: Option<Box<dyn FluidModel>>,
     pub(super) fluid_dofs: Vec<usize>,
@@ -175,6 +179,8 @@ impl Balance {
             masked,
             diagonal,
             system: NearlySymmetric::new(pattern.clone())?,
+            embedding: (0..pattern.entries() as u32).collect(),
+            barrier: model.barrier().map(BarrierTerm::new),
             gmres: Gmres::new(size, KRYLOV_LIMIT.min(size)),
             work: super::solve::Work::new(n, 3 * fluid_dofs.len()),
             slip: vec![0.0; 3 * fluid_dofs.len()],
@@ -220,10 +226,13 @@ impl Balance {
         done
     }
 
-    /// Prepares a step: the fluid's force, if it is that of the last velocities, and no contact.
-    pub fn begin(&mut self, step: &Step, statistics: &mut Statistics) -> Result<(), LinearError> {
+    /// Prepares a step: the fluid's force, if it is that of the last velocities, and what contact takes from its beginning.
+    pub fn begin(&mut self, model: &Model, step: &Step, statistics: &mut Statistics) -> Result<(), LinearError> {
         let start = Instant::now();
         self.contact.fill(0.0);
+        if let (Some(law), Some(barrier)) = (model.barrier(), &mut self.barrier) {
+            barrier.begin(law, model.network.node_dofs(), &step.state.q);
+        }
         self.constant.fill(0.0);
         if let Some(fluid) = self.fluid.as_mut().filter(|_| !step.scheme.fluid_is_implicit()) {
             gather(&self.fluid_dofs, |dof| step.state.velocity[dof], &mut self.flow);
@@ -258,6 +267,14 @@ impl Balance {
         }
         // A dry node has no drag of its own; the mean of the others is as good a scale for its contacts as any.
         out.iter_mut().zip(&immersed).filter(|(_, wet)| !**wet).for_each(|(stiffness, _)| *stiffness += mean);
+    }
+
+    /// Part of the way between two sets of degrees of freedom over which contact lets the nodes go.
+    pub fn step_limit(&mut self, model: &Model, from: &[f64], to: &[f64]) -> f64 {
+        match (model.barrier(), &mut self.barrier) {
+            (Some(law), Some(barrier)) => barrier.step_limit(law, model.network.node_dofs(), from, to),
+            _ => 1.0,
+        }
     }
 
     /// Largest force per displacement that inertia and drag exert within the step, N/m.
@@ -302,6 +319,10 @@ impl Balance {
             model.inertia.add(&self.configuration, &increment, &mut out);
         }
         model.dissipative.iter().for_each(|term| term.add(&self.configuration, &increment, &mut out));
+        if let (Some(law), Some(barrier)) = (model.barrier(), &mut self.barrier) {
+            let dofs = model.network.node_dofs();
+            barrier.add_forces(law, dofs, q, &increment, &mut self.elastic, &mut self.residual);
+        }
         self.add_fluid(step, trial)?;
         for (motor, torque) in model.motors.iter().zip(&step.motor_torques) {
             if let Drive::Torque { dof, .. } = motor.drive {

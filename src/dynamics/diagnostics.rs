@@ -1,5 +1,6 @@
 //! What a state tells: energies, motor torques, force densities, gaps, the balance of forces and torques.
 
+use super::contact_model::ContactModel;
 use super::simulation::Simulation;
 use crate::Vec3;
 use crate::elastic::motors::Drive;
@@ -18,17 +19,16 @@ impl Simulation {
     }
 
     /// Smallest gap between surfaces that may touch, m; `None` without contact.
-    pub fn smallest_gap(&self) -> Option<f64> {
-        let law = self.model.contact.as_ref()?;
-        law.smallest_gap(&self.state.positions(&self.model.network)).map(|(gap, _)| gap)
-    }
-
-    /// The deepest initial overlap: its depth in m and the pair of edges.
-    pub fn deepest_overlap(&self) -> Option<(f64, [usize; 2])> {
-        let law = self.model.contact.as_ref()?;
-        let (gap, [a, b]) = law.smallest_gap(&self.state.positions(&self.model.network))?;
-        let sum = self.model.radius[a] + self.model.radius[b];
-        (gap < -law.tolerance() * sum).then_some((-gap, [a, b]))
+    pub fn smallest_gap(&mut self) -> Option<f64> {
+        match (self.model.contact.as_ref()?, &mut self.balance.barrier) {
+            (ContactModel::Barrier(law), Some(barrier)) => {
+                barrier.closest(law, self.model.network.node_dofs(), &self.state.q).map(|approach| approach.gap())
+            }
+            (ContactModel::SpillmannTeschner(law), _) => {
+                law.smallest_gap(&self.state.positions(&self.model.network)).map(|(gap, _)| gap)
+            }
+            _ => None,
+        }
     }
 
     /// Torque of every motor on its shaft, N m.

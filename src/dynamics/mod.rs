@@ -6,6 +6,7 @@
 //! * [`terms`]: inertia and loads, the terms that belong to no other room.
 //! * [`adaptive`]: steps of adaptive size and order, and output between them.
 //! * [`balance`]: the force balance of one step: residual and derivative; `solve`: its linear systems.
+//! * [`contact_model`]: how rods are kept apart; `barrier_term`: the barrier in a step's equations.
 //! * [`control`]: the size and order of adaptive steps.
 //! * [`newton`]: Newton's method with line search on that balance.
 //! * [`predictor`]: past states: guesses, backward differences, dense output.
@@ -16,6 +17,8 @@
 
 pub mod adaptive;
 pub mod balance;
+mod barrier_term;
+pub mod contact_model;
 pub mod control;
 pub mod diagnostics;
 pub mod model;

@@ -1,12 +1,13 @@
 //! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
 
+use super::contact_model::{ContactModel, Overlap};
 use super::control::Control;
 use super::predictor::History;
 use super::specification::{FluidModelSpecification, Specification};
 use super::state::State;
 use super::terms::{Inertia, Loads};
 use crate::Vec3;
-use crate::contact::spillmann::ContactLaw;
+use crate::contact::potential::BarrierLaw;
 use crate::elastic::bending::Bending;
 use crate::elastic::hinges::Hinges;
 use crate::elastic::motors::{Drive, Motor};
@@ -57,6 +58,9 @@ pub enum ModelError {
         /// Which shape.
         shape: &'static str,
     },
+    /// Two bodies are closer than contact can start from.
+    #[error("{0}")]
+    Overlap(Overlap),
     /// A matrix of the model cannot be analysed.
     #[error(transparent)]
     Linear(#[from] LinearError),
@@ -85,11 +89,10 @@ pub struct Model {
     /// Turns residuals into forces: 1 for positions, one over a length for angles.
     pub(super) force_weight: Vec<f64>,
     pub(super) mass: Vec<f64>,
-    pub(super) radius: Vec<f64>,
     pub(super) stretching_scale: f64,
     pub(super) bending_scale: f64,
     pub(super) shortest_edge: f64,
-    pub(super) contact: Option<ContactLaw>,
+    pub(super) contact: Option<ContactModel>,
     pub(super) specification: Specification,
 }
 
@@ -131,18 +134,10 @@ impl Model {
         network.node_dofs().iter().for_each(|&dof| force_weight[dof..dof + 3].fill(1.0));
         let (clamps, prescribed) = clamps(&specification, &network, dof_count);
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let contact = specification.contact.as_ref().map(|contact| {
-            ContactLaw::new(
-                network.node_count(),
-                network.edges(),
-                &rest.lengths,
-                &specification.radius,
-                contact.exclusion,
-                &contact.colliding,
-                contact.tolerance,
-                contact.max_iterations,
-            )
-        });
+        let contact = specification
+            .contact
+            .as_ref()
+            .map(|contact| ContactModel::new(contact, &network, &rest.lengths, &specification.radius));
         let state = initial_state(&specification, &network, dof_count);
         let model = Self {
             dof_count,
@@ -156,7 +151,6 @@ impl Model {
             pattern,
             force_weight,
             mass,
-            radius: specification.radius.clone(),
             stretching_scale: largest(&mut specification.stretching.iter().copied()),
             bending_scale: largest(&mut specification.bending.iter().map(|ei| ei[0][0].max(ei[1][1])))
                 / (total_length * total_length),
@@ -173,9 +167,24 @@ impl Model {
         Ok((model, state))
     }
 
+    /// The deepest overlap of a state from which contact cannot go on.
+    pub(super) fn overlap(&self, state: &State) -> Option<Overlap> {
+        self.contact.as_ref()?.overlap(&state.positions(&self.network))
+    }
+
+    /// The law of barrier contact, if there is any.
+    pub(super) fn barrier(&self) -> Option<&BarrierLaw> {
+        self.contact.as_ref().and_then(ContactModel::barrier)
+    }
+
     /// Topology and numbering.
     pub fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// Number of bodies that contact knows: edges, and with barrier contact spheres.
+    pub fn body_count(&self) -> usize {
+        self.barrier().map_or(self.network.edges().len(), |law| law.bodies().radius().len())
     }
 
     /// Number of degrees of freedom, free motor angles last.
@@ -352,6 +361,7 @@ fn initial_state(specification: &Specification, network: &Network, dof_count: us
         tensions: vec![0.0; network.edges().len()],
         motor_angles: vec![0.0; specification.motors.len()],
         contacts: Vec::new(),
+        contact_anchor: Vec::new(),
     }
 }
 

@@ -101,6 +101,12 @@ impl Newton<'_, '_> {
         self.balance.evaluate(self.model, self.step, &self.work.trial, self.statistics)
     }
 
+    /// The part of the direction that contact allows.
+    fn full_length(&mut self) -> f64 {
+        self.work.try_length(self.unknowns, 1.0);
+        self.balance.step_limit(self.model, &self.unknowns.q, &self.work.trial.q)
+    }
+
     fn accept(&mut self) {
         std::mem::swap(self.unknowns, &mut self.work.trial);
     }
@@ -133,7 +139,7 @@ impl Newton<'_, '_> {
             self.linearize()
                 .and_then(|()| self.find_direction(linear))
                 .map_err(|error| failure(Some(size), iteration, &error.to_string()))?;
-            let mut length = 1.0;
+            let mut length = self.full_length();
             let lower = (0..BACKTRACKS).find_map(|_| {
                 let sufficient = (1.0 - 1e-4 * length) * size.merit;
                 let trial = self.try_length(length).filter(|trial| trial.merit < sufficient);
@@ -170,10 +176,11 @@ impl Newton<'_, '_> {
             }
             let linear = (LINEAR_SHARE * tolerance / correction).clamp(LINEAR_TOLERANCE, LOOSEST_CORRECTION);
             self.find_direction(linear).map_err(broken)?;
-            let mut length = 1.0;
+            let full = self.full_length();
+            let mut length = full;
             let lower = (0..BACKTRACKS).find_map(|_| {
                 // The first full steps may go uphill: the test itself is blurred while edges still turn by much.
-                let uphill = if length == 1.0 && iteration < UPHILL_ITERATIONS { UPHILL } else { 1.0 - 0.25 * length };
+                let uphill = if length == full && iteration < UPHILL_ITERATIONS { UPHILL } else { 1.0 - 0.25 * length };
                 let sufficient = uphill * correction;
                 let trial = self.try_length(length)?;
                 let left = self.correction().ok()?;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::balance::{Balance, Step, Unknowns};
+use super::contact_model::ContactModel;
 use super::control::Control;
 use super::model::{Model, ModelError};
 use super::newton::{self, Goal, NewtonSettings, NewtonWork};
@@ -102,9 +103,12 @@ impl Simulation {
     /// [`ModelError`] naming what is not valid.
     pub fn new(specification: Specification, scheme: Scheme, dt: f64, thread_count: usize) -> Result<Self, ModelError> {
         let (model, state) = Model::new(specification)?;
+        if let Some(overlap) = model.overlap(&state) {
+            return Err(ModelError::Overlap(overlap));
+        }
         let pool = threads::pool(thread_count);
         let balance = Balance::new(&model, pool.as_ref().map(Arc::clone))?;
-        let contact = model.contact.as_ref().map(ContactSolver::new);
+        let contact = model.contact.as_ref().and_then(ContactModel::spillmann).map(ContactSolver::new);
         let mut state = state;
         state.density = balance.zero_density(scheme);
         let trial = Unknowns { q: state.q.clone(), density: state.density.clone(), tensions: state.tensions.clone() };
@@ -164,15 +168,31 @@ impl Simulation {
 
     /// Takes over a saved state of the same model.
     pub fn restore(&mut self, state: State) {
+        if let (Some(law), Some(barrier)) = (self.model.barrier(), &mut self.balance.barrier) {
+            let positions = state.positions(&self.model.network);
+            barrier.ensure_at(law, if state.contact_anchor.is_empty() { &positions } else { &state.contact_anchor });
+        }
         self.state = state;
         self.fluid_step = None;
+    }
+
+    /// As [`Self::restore`], for a state from elsewhere.
+    ///
+    /// # Errors
+    /// [`ModelError::Overlap`] if barrier contact cannot go on from there; the present state is then kept.
+    pub fn adopt(&mut self, state: State) -> Result<(), ModelError> {
+        if let Some(overlap) = self.model.overlap(&state).filter(|_| self.model.barrier().is_some()) {
+            return Err(ModelError::Overlap(overlap));
+        }
+        self.restore(state);
+        Ok(())
     }
 
     /// Moves nodes and, if given, edge angles; at rest. Frames are transported from those of the last accepted state, so
     /// that the result depends on the positions alone and not on a path to them.
     ///
     /// # Errors
-    /// [`ModelError::Shape`] if the positions are not a configuration; the state is unchanged.
+    /// [`ModelError::Shape`] if the positions are not a configuration, and as [`Self::adopt`]; the state is unchanged.
     pub fn place(&mut self, nodes: &[Vec3], theta: Option<&[f64]>) -> Result<(), ModelError> {
         let mut state = self.state.clone();
         let network = &self.model.network;
@@ -186,13 +206,13 @@ impl Simulation {
         state.history = History::default();
         state.density.fill(0.0);
         state.tensions.fill(0.0);
+        state.contact_anchor.clear();
         state.control = Control::default();
         rebase(&mut state.frames, network.edges(), nodes);
         if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
             return Err(ModelError::Shape { shape: "nodes" });
         }
-        self.restore(state);
-        Ok(())
+        self.adopt(state)
     }
 
     /// Advances by one step: of `dt`, in as many smaller ones as it takes, or of the size the tolerance asks for.
@@ -240,13 +260,14 @@ impl Simulation {
     }
 
     pub(super) fn convergence_error(
-        &self,
+        &mut self,
         dt: f64,
         residual: f64,
         iterations: usize,
         worst: usize,
         reason: String,
     ) -> StepError {
+        let smallest_gap = self.smallest_gap().unwrap_or(f64::INFINITY);
         let dofs = self.model.network.node_dofs();
         StepError::Convergence {
             time: self.state.time,
@@ -254,7 +275,7 @@ impl Simulation {
             dt,
             residual,
             iterations,
-            smallest_gap: self.smallest_gap().unwrap_or(f64::INFINITY),
+            smallest_gap,
             worst_node: dofs.partition_point(|&dof| dof <= worst).saturating_sub(1),
             reason,
         }
@@ -344,14 +365,16 @@ impl Simulation {
             self.fluid_step = Some(state.steps);
         }
         let step = Step::new(*scheme, state, dt, order, motors);
-        balance.begin(&step, statistics)?;
+        balance.begin(model, &step, statistics)?;
         let failed = |failure: newton::NewtonFailure| TryError::Solve {
             residual: failure.residual,
             iterations: failure.iterations,
             worst: failure.worst,
             reason: failure.reason,
         };
-        let (Some(law), Some(contact)) = (&model.contact, contact) else {
+        let law = model.contact.as_ref().and_then(ContactModel::spillmann);
+        let (Some(law), Some(contact)) = (law, contact) else {
+            keep_apart(balance, model, &state.q, &mut trial.q)?;
             newton::solve(balance, model, &step, settings, work, trial, statistics).map_err(failed)?;
             return Ok(step.motor_angles);
         };
@@ -415,8 +438,34 @@ impl Simulation {
             state.contacts.clear();
             state.contacts.extend_from_slice(contact.forces());
         }
+        if let (Some(law), Some(barrier)) = (self.model.barrier(), &mut self.balance.barrier) {
+            let forces = barrier.forces(law, self.model.network.node_dofs(), &state.q);
+            state.contacts = forces.iter().map(|force| (force.indices(law), force.force.norm())).collect();
+            state.contact_anchor.clear();
+            state.contact_anchor.extend_from_slice(barrier.anchor());
+        }
         self.statistics.steps += 1;
     }
+}
+
+/// Shortens the way from the beginning of a step to the guess at its end to what contact allows.
+fn keep_apart(balance: &mut Balance, model: &Model, from: &[f64], guess: &mut [f64]) -> Result<(), TryError> {
+    if model.barrier().is_none() {
+        return Ok(());
+    }
+    let mut start = from.to_vec();
+    let prescribed = model.prescribed.iter().zip(start.iter_mut().zip(&*guess));
+    prescribed.filter(|(held, _)| **held).for_each(|(_, (start, end))| *start = *end);
+    let blocked =
+        |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: 0, reason: reason.to_owned() };
+    if balance.step_limit(model, from, &start) < 1.0 {
+        return Err(blocked("what is prescribed moves filaments into each other"));
+    }
+    let limit = balance.step_limit(model, &start, guess);
+    if limit < 1.0 {
+        guess.iter_mut().zip(&start).for_each(|(guess, start)| *guess = start + limit * (*guess - start));
+    }
+    Ok(())
 }
 
 /// Gives edges that have turned over completely since the reference a reference of their own: transport from

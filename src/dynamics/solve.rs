@@ -61,10 +61,28 @@ impl Balance {
         self.differentiate(model, step, tensions);
         let assembled = Instant::now();
         statistics.seconds_assembly += (assembled - start).as_secs_f64();
-        self.system.values_mut().copy_from_slice(&self.jacobian);
-        let factored = self.system.factor();
+        let factored = self.fill_system(model, step.rate).and_then(|()| self.system.factor());
         statistics.seconds_linear += assembled.elapsed().as_secs_f64();
         factored
+    }
+
+    /// The matrix of the linear system: the model's, and contact's, whose pattern changes.
+    fn fill_system(&mut self, model: &Model, rate: f64) -> Result<(), LinearError> {
+        let contact = model.barrier().zip(self.barrier.as_mut());
+        if let Some((_, barrier)) = contact.filter(|(_, barrier)| !barrier.is_bound()) {
+            let stencils = barrier.stencils(model.network.node_dofs());
+            let (pattern, embedding) = model.pattern.extended(stencils.iter().map(Vec::as_slice));
+            barrier.bind(&pattern);
+            self.system = NearlySymmetric::new(pattern)?;
+            self.embedding = embedding;
+        }
+        let values = self.system.values_mut();
+        values.fill(0.0);
+        self.embedding.iter().zip(&self.jacobian).for_each(|(&slot, value)| values[slot as usize] = *value);
+        if let (Some(law), Some(barrier)) = (model.barrier(), &self.barrier) {
+            barrier.add_matrix(law, rate, &model.prescribed, values);
+        }
+        Ok(())
     }
 
     /// Newton direction for the last residual, from the given tensions of edges; `tolerance` is the relative residual of the

@@ -74,13 +74,36 @@ pub struct FluidSpecification {
     pub density: f64,
 }
 
-/// Contact by the method of Spillmann and Teschner.
+/// How penetration is prevented.
+#[derive(Debug, Clone)]
+pub enum ContactMethodSpecification {
+    /// By the method of Spillmann and Teschner.
+    SpillmannTeschner {
+        /// Deepest penetration left, as a fraction of the sum of radii.
+        tolerance: f64,
+        /// Largest number of passes in a step.
+        max_iterations: usize,
+    },
+    /// By a potential that grows without bound.
+    Barrier {
+        /// Tolerance `delta`: contact acts between `1 - delta` and `1 + delta` sums of radii.
+        tolerance: f64,
+        /// Stiffness, Pa.
+        stiffness: f64,
+        /// Coefficient of friction.
+        friction: f64,
+        /// Velocity from which on contacts slide, m/s.
+        slip_velocity: f64,
+        /// Node and radius (m) of every sphere.
+        spheres: Vec<(usize, f64)>,
+    },
+}
+
+/// Contact.
 #[derive(Debug, Clone)]
 pub struct ContactSpecification {
-    /// Deepest penetration left, as a fraction of the sum of radii.
-    pub tolerance: f64,
-    /// Largest number of passes in a step.
-    pub max_iterations: usize,
+    /// The method and its parameters.
+    pub method: ContactMethodSpecification,
     /// Excluded rest arc length, in sums of radii.
     pub exclusion: f64,
     /// The edges that can touch others.

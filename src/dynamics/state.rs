@@ -29,8 +29,10 @@ pub struct State {
     pub frames: ReferenceFrames,
     /// Angle of every motor, rad.
     pub motor_angles: Vec<f64>,
-    /// Contact multipliers of the last step: pairs of edges and accumulated displacement, m.
+    /// Contact forces of the last step: pairs of bodies (edges first) and force, N.
     pub contacts: Vec<([u32; 2], f64)>,
+    /// Positions of the nodes, m, where barrier contact has listed its near pairs; empty without.
+    pub contact_anchor: Vec<Vec3>,
 }
 
 impl State {

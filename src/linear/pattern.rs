@@ -78,14 +78,41 @@ impl Pattern {
         self.row_indices[range.clone()].binary_search(&row).ok().map(|k| range.start + k)
     }
 
+    /// This pattern and dense blocks over further stencils; and where each of its own entries is stored there.
+    pub fn extended<'a>(&self, stencils: impl Iterator<Item = &'a [usize]>) -> (Self, Vec<u32>) {
+        let mut further: Vec<(usize, usize)> = stencils
+            .flat_map(|stencil| stencil.iter().flat_map(move |&column| stencil.iter().map(move |&row| (column, row))))
+            .collect();
+        further.sort_unstable();
+        further.dedup();
+        let mut extended = Self { size: self.size, column_starts: vec![0], row_indices: Vec::new() };
+        let mut embedding = Vec::with_capacity(self.entries());
+        let mut next = further.into_iter().peekable();
+        for column in 0..self.size {
+            for &row in &self.row_indices[self.column_starts[column]..self.column_starts[column + 1]] {
+                while let Some((_, above)) = next.next_if(|&(c, r)| c == column && r <= row) {
+                    if above < row {
+                        extended.row_indices.push(above);
+                    }
+                }
+                embedding.push(extended.row_indices.len() as u32);
+                extended.row_indices.push(row);
+            }
+            while let Some((_, below)) = next.next_if(|&(c, _)| c == column) {
+                extended.row_indices.push(below);
+            }
+            extended.column_starts.push(extended.row_indices.len());
+        }
+        (extended, embedding)
+    }
+
     /// Slots of the element matrix on a stencil that was part of the pattern's construction.
     ///
     /// # Panics
     /// If the stencil was not part of it: a defect of the caller, found on construction of a model.
     pub fn element_slots(&self, stencil: &[usize]) -> ElementSlots {
-        let slots = stencil
-            .iter()
-            .flat_map(|&column| stencil.iter().map(move |&row| (row, column)))
+        let entries = stencil.iter().flat_map(|&column| stencil.iter().map(move |&row| (row, column)));
+        let slots = entries
             .map(|(row, column)| self.slot(row, column).expect("the stencil belongs to the pattern") as u32)
             .collect();
         ElementSlots { slots, width: stencil.len() }

@@ -41,6 +41,7 @@ pub fn model_error(py: Python<'_>, error: &ModelError) -> PyErr {
         ModelError::Shape { shape } => {
             scene_error(py, shape, "a degenerate shape", "edges of non-zero length, none folded onto its neighbour")
         }
+        ModelError::Overlap(overlap) => scene_error(py, "nodes", &overlap.to_string(), "a shape without overlaps"),
         other => make(py, "SceneError", &other.to_string(), &PyDict::new(py)),
     }
 }

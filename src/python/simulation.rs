@@ -38,10 +38,6 @@ impl Simulation {
         }
         let specification = scene.specification(py)?;
         let inner = core::Simulation::new(specification, scheme, dt, threads).map_err(|e| model_error(py, &e))?;
-        if let Some((depth, [a, b])) = inner.deepest_overlap() {
-            let value = format!("edges {a} and {b}, which overlap by {depth:.3e} m");
-            return Err(scene_error(py, "nodes", &value, "an initial shape without overlaps"));
-        }
         Ok(Self { inner })
     }
 
@@ -299,6 +295,7 @@ impl Simulation {
         out.set_item("twists", PyArray1::from_slice(py, &state.frames.twists))?;
         out.set_item("motor_angles", PyArray1::from_slice(py, &state.motor_angles))?;
         out.set_item("contact_pairs", PyArray1::from_iter(py, pairs).reshape([state.contacts.len(), 2])?)?;
+        out.set_item("contact_anchor", from_points(py, &state.contact_anchor)?)?;
         out.set_item("contact_forces", PyArray1::from_iter(py, state.contacts.iter().map(|(_, force)| *force)))?;
         Ok(out)
     }
@@ -323,6 +320,7 @@ impl Simulation {
             },
             motor_angles: values(&saved.motor_angles),
             contacts: contacts(&saved),
+            contact_anchor: points(py, "contact_anchor", &saved.contact_anchor)?,
         };
         // Schemes without a force density of their own save an empty one; the next step finds it.
         let kept = state.density.len();
@@ -338,14 +336,15 @@ impl Simulation {
             && state.motor_angles.len() == current.motor_angles.len()
             && state.density.len() == flow
             && state.tensions.len() == current.tensions.len()
+            && [0, self.inner.model().network().node_count()].contains(&state.contact_anchor.len())
             && saved.history_states.shape() == [state.history.past.len(), current.q.len()]
             && saved.history_velocities.shape() == [state.history.past.len(), current.q.len()]
             && saved.history_densities.shape() == [state.history.past.len(), kept];
-        let edges = self.inner.model().network().edges().len();
+        let bodies = self.inner.model().body_count();
         let pairs = saved.contact_pairs.as_array();
         let known = pairs.ncols() == 2
             && pairs.nrows() == saved.contact_forces.as_array().len()
-            && pairs.iter().all(|&edge| usize::try_from(edge).is_ok_and(|edge| edge < edges));
+            && pairs.iter().all(|&body| usize::try_from(body).is_ok_and(|body| body < bodies));
         let past = state.history.past.iter();
         let present = [&state.q, &state.velocity, &state.density, &state.tensions];
         let finite = present
@@ -354,14 +353,14 @@ impl Simulation {
             .chain(past.flat_map(|sample| [&sample.q, &sample.velocity, &sample.density]))
             .flatten()
             .chain(state.contacts.iter().map(|(_, force)| force))
+            .chain(state.contact_anchor.iter().flatten())
             .chain(state.history.past.iter().map(|sample| &sample.time))
             .chain([&state.time, &state.control.dt])
             .all(|value| value.is_finite());
         if !(same && known && finite) {
             return Err(scene_error(py, "state", "the saved state", "a finite state of the same scene"));
         }
-        self.inner.restore(state);
-        Ok(())
+        self.inner.adopt(state).map_err(|error| model_error(py, &error))
     }
 }
 
@@ -388,6 +387,7 @@ struct StateInput<'py> {
     motor_angles: PyReadonlyArray1<'py, f64>,
     contact_pairs: PyReadonlyArray2<'py, i64>,
     contact_forces: PyReadonlyArray1<'py, f64>,
+    contact_anchor: PyReadonlyArray2<'py, f64>,
 }
 
 fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {

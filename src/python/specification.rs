@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use super::arrays::{pairs, points, values};
 use crate::Vec3;
 use crate::dynamics::specification::{
-    ClampSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification, HeadSpecification,
-    MotorSpecification, Specification,
+    ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
+    HeadSpecification, MotorSpecification, Specification,
 };
 use crate::elastic::signal::Signal;
 
@@ -76,8 +76,13 @@ struct FluidInput<'py> {
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct ContactInput {
+    barrier: bool,
     tolerance: f64,
     max_iterations: usize,
+    stiffness: f64,
+    friction: f64,
+    slip_velocity: f64,
+    spheres: Vec<(usize, f64)>,
     exclusion: f64,
     colliding: Vec<bool>,
 }
@@ -157,16 +162,24 @@ impl SceneInput<'_> {
             loads: self.loads.into_iter().map(|(node, force)| (node, Vec3::from(force))).collect(),
             gravity: Vec3::from(self.gravity),
             fluid: self.fluid.map(fluid),
-            contact: self.contact.map(|contact| ContactSpecification {
-                tolerance: contact.tolerance,
-                max_iterations: contact.max_iterations,
-                exclusion: contact.exclusion,
-                colliding: contact.colliding,
-            }),
+            contact: self.contact.map(contact),
             nodes,
             edges,
             hinges,
         })
+    }
+}
+
+fn contact(input: ContactInput) -> ContactSpecification {
+    let ContactInput { tolerance, max_iterations, stiffness, friction, slip_velocity, spheres, .. } = input;
+    ContactSpecification {
+        method: if input.barrier {
+            ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocity, spheres }
+        } else {
+            ContactMethodSpecification::SpillmannTeschner { tolerance, max_iterations }
+        },
+        exclusion: input.exclusion,
+        colliding: input.colliding,
     }
 }
 

@@ -1,0 +1,154 @@
+//! Barrier contact as a part of a step's equations: its elements change as rods move, and with them the sparsity pattern.
+
+use crate::Vec3;
+use crate::contact::pair::Curvature;
+use crate::contact::potential::{Approach, BarrierLaw, BarrierState, ContactForce};
+use crate::linear::pattern::{ElementSlots, Pattern};
+use crate::rod::assembly::Increment;
+use crate::rod::configuration::node;
+
+/// The near pairs at the configuration of the last residual, and where their matrices are stored.
+pub(super) struct BarrierTerm {
+    state: BarrierState,
+    nodes: Vec<Vec3>,
+    velocities: Vec<Vec3>,
+    towards: Vec<Vec3>,
+    stencils: Vec<Vec<usize>>,
+    slots: Vec<ElementSlots>,
+    bound: bool,
+}
+
+fn place(q: &[f64], node_dofs: &[usize], out: &mut Vec<Vec3>) {
+    out.clear();
+    out.extend(node_dofs.iter().map(|&dof| node(q, dof)));
+}
+
+impl BarrierTerm {
+    pub fn new(law: &BarrierLaw) -> Self {
+        Self {
+            state: law.state(),
+            nodes: Vec::new(),
+            velocities: Vec::new(),
+            towards: Vec::new(),
+            stencils: Vec::new(),
+            slots: Vec::new(),
+            bound: true,
+        }
+    }
+
+    /// Takes the forces and directions of friction from the beginning of a step.
+    pub fn begin(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) {
+        self.place(law, node_dofs, q);
+        if law.lag(&mut self.state, &self.nodes) {
+            self.bound = false;
+        }
+    }
+
+    /// Where the list of near pairs was made, m: part of a state, since results depend on the list in their last digits.
+    pub fn anchor(&self) -> &[Vec3] {
+        self.state.anchor()
+    }
+
+    /// Makes the list of near pairs where another state had made it.
+    pub fn ensure_at(&mut self, law: &BarrierLaw, anchor: &[Vec3]) {
+        if law.ensure_at(&mut self.state, anchor) {
+            self.bound = false;
+        }
+    }
+
+    fn place(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) {
+        place(q, node_dofs, &mut self.nodes);
+        if law.ensure(&mut self.state, &self.nodes) {
+            self.bound = false;
+        }
+    }
+
+    /// Adds the gradient of the energy to `elastic`, and friction to `residual`.
+    pub fn add_forces(
+        &mut self,
+        law: &BarrierLaw,
+        node_dofs: &[usize],
+        q: &[f64],
+        increment: &Increment,
+        elastic: &mut [f64],
+        residual: &mut [f64],
+    ) {
+        self.place(law, node_dofs, q);
+        let stencils: Vec<&[usize]> = self.state.stencils().collect();
+        let spread = |element: usize, gradient: &[f64], out: &mut [f64]| {
+            for (&node, part) in stencils[element].iter().zip(gradient.chunks_exact(3)) {
+                (0..3).for_each(|c| out[node_dofs[node] + c] += part[c]);
+            }
+        };
+        law.add(&self.state, &self.nodes, None, |element, gradient, _| spread(element, gradient, elastic));
+        if law.has_friction() {
+            self.velocities.clear();
+            let rate = |dof: usize| increment.rate_of(dof, q[dof]);
+            self.velocities.extend(node_dofs.iter().map(|&dof| Vec3::from_fn(|c, _| rate(dof + c))));
+            let add = |element: usize, gradient: &[f64], _: Option<&[f64]>| spread(element, gradient, residual);
+            law.add_friction(&self.state, &self.velocities, false, add);
+        }
+    }
+
+    /// Whether all elements have their storage on the pattern they were bound to.
+    pub fn is_bound(&self) -> bool {
+        self.bound
+    }
+
+    /// Degrees of freedom of all elements.
+    pub fn stencils(&mut self, node_dofs: &[usize]) -> &[Vec<usize>] {
+        self.stencils.clear();
+        let dofs = |nodes: &[usize]| nodes.iter().flat_map(|&n| node_dofs[n]..node_dofs[n] + 3).collect();
+        self.stencils.extend(self.state.stencils().map(dofs));
+        &self.stencils
+    }
+
+    /// Looks up the storage of all elements of the last [`Self::stencils`].
+    pub fn bind(&mut self, pattern: &Pattern) {
+        self.slots.clear();
+        self.slots.extend(self.stencils.iter().map(|stencil| pattern.element_slots(stencil)));
+        self.bound = true;
+    }
+
+    /// Adds the derivative at the configuration of the last residual; rows and columns of prescribed degrees of freedom are left out.
+    pub fn add_matrix(&self, law: &BarrierLaw, rate: f64, prescribed: &[bool], values: &mut [f64]) {
+        let mut free = [0.0; 144];
+        let mut store = |element: usize, matrix: Option<&[f64]>, factor: f64| {
+            let (stencil, Some(matrix)) = (&self.stencils[element], matrix) else { return };
+            let width = stencil.len();
+            for (column, &j) in stencil.iter().enumerate() {
+                for (row, &i) in stencil.iter().enumerate() {
+                    let k = row + width * column;
+                    free[k] = if prescribed[i] || prescribed[j] { 0.0 } else { factor * matrix[k] };
+                }
+            }
+            self.slots[element].add(&free[..width * width], values);
+        };
+        law.add(&self.state, &self.nodes, Some(Curvature::Exact), |element, _, matrix| store(element, matrix, 1.0));
+        if law.has_friction() {
+            law.add_friction(&self.state, &self.velocities, true, |element, _, matrix| store(element, matrix, rate));
+        }
+    }
+
+    /// Part of the way from `from` to `to` over which no pair comes too close.
+    pub fn step_limit(&mut self, law: &BarrierLaw, node_dofs: &[usize], from: &[f64], to: &[f64]) -> f64 {
+        let mut start = std::mem::take(&mut self.velocities);
+        place(from, node_dofs, &mut start);
+        place(to, node_dofs, &mut self.towards);
+        let limit = law.step_limit(&mut self.state, &start, &self.towards);
+        self.velocities = start;
+        limit
+    }
+
+    /// Every pair that pushes at these degrees of freedom.
+    pub fn forces(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) -> Vec<ContactForce> {
+        self.place(law, node_dofs, q);
+        law.forces(&self.state, &self.nodes)
+    }
+
+    /// The pair whose surfaces are closest at these degrees of freedom.
+    pub fn closest(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) -> Option<Approach> {
+        self.place(law, node_dofs, q);
+        law.smallest_gap(&self.state, &self.nodes)
+    }
+}
