@@ -72,7 +72,7 @@ fn pair_at(random: &mut Random, features: Features, angle: f64) -> [Vec3; 4] {
         }
         Features::Ends => {
             // The gap leans along both segments, which lead away from each other.
-            let p = (normal * 0.8 + along * 0.6) * distance;
+            let p = (normal * 0.7 + along * 0.6 + side * 0.387).normalize() * distance;
             [p, p + in_plane * a, Vec3::zeros(), -along * b]
         }
     }
@@ -384,7 +384,7 @@ fn greatest_change(rods: impl Fn(f64) -> Vec<Vec<Vec3>>, samples: usize) -> [f64
         }
         last = Some(now);
     }
-    assert!(sizes[0] > 0.0);
+    assert!(sizes.iter().all(|size| *size > 0.0 && size.is_finite()), "{sizes:?}");
     [changes[0] / sizes[0], changes[1] / sizes[1]]
 }
 
@@ -392,7 +392,7 @@ fn greatest_change(rods: impl Fn(f64) -> Vec<Vec<Vec3>>, samples: usize) -> [f64
 fn energy_and_force_are_continuous_across_features_and_nodes() {
     // A bent rod of 5 edges and a straight one.
     let bent = |shift: Vec3| -> Vec<Vec3> {
-        let arc = |k: usize| Vec3::new(k as f64, 0.06 * (k as f64 - 2.0).powi(2), 0.01 * (k as f64 - 2.0).powi(3));
+        let arc = |k: usize| Vec3::new(k as f64, 0.06 * (k as f64 - 2.0).powi(2), 0.0004 * (k as f64 - 2.0).powi(3));
         (0..6).map(|k| arc(k) + shift).collect()
     };
     let at_angle = |angle: f64, centre: Vec3| rod(centre, Vec3::new(angle.cos(), angle.sin(), 0.0), 3.0, 3);
@@ -414,7 +414,7 @@ fn energy_and_force_are_continuous_across_features_and_nodes() {
             Box::new(move |t| {
                 vec![
                     rod(Vec3::zeros(), Vec3::x(), 4.0, 4),
-                    rod(Vec3::new(3.4 + 0.3 * t, 0.3 * t - 0.2, 0.25), Vec3::new(0.9, 0.2, 0.3).normalize(), 3.0, 3),
+                    rod(Vec3::new(3.44 + 0.3 * t, 0.3 * t - 0.2, 0.45), Vec3::new(0.9, 0.2, 0.3).normalize(), 3.0, 3),
                 ]
             }),
         ),
@@ -433,7 +433,7 @@ fn energy_and_force_are_continuous_across_features_and_nodes() {
 fn fork_with_spheres() -> (Vec<Vec3>, BarrierLaw) {
     let mut nodes = vec![Vec3::zeros()];
     let mut edges = Vec::new();
-    for direction in [Vec3::new(1.0, 0.0, 0.02), Vec3::new(-0.5, 0.85, 0.0), Vec3::new(-0.5, -0.85, 0.0)] {
+    for direction in [Vec3::new(1.0, 0.0, 0.002), Vec3::new(-0.5, 0.85, 0.0), Vec3::new(-0.5, -0.85, 0.0)] {
         for k in 1..=3 {
             edges.push([if k == 1 { 0 } else { nodes.len() - 1 }, nodes.len()]);
             nodes.push(direction * k as f64);
@@ -462,7 +462,7 @@ fn fork_with_spheres() -> (Vec<Vec3>, BarrierLaw) {
 fn assembled_derivatives_agree_with_differences() {
     let (nodes, law) = fork_with_spheres();
     let mut state = law.state();
-    assert!(law.ensure(&mut state, &nodes));
+    assert!(law.ensure(&mut state, &nodes) && law.first_overlap(&nodes).is_none());
     let widths: Vec<usize> = state.stencils().map(<[usize]>::len).collect();
     assert!([2, 3, 4].iter().all(|width| widths.contains(width)));
     let mut touching = [false; 5];
@@ -719,7 +719,7 @@ fn friction_opposes_sliding_and_has_exact_derivatives() {
         let on_b: Vec3 = -(gradient.fixed_rows::<3>(6) + gradient.fixed_rows::<3>(9));
         let most = friction.coefficient * contact.force;
         assert!(on_a.norm() <= most * (1.0 + 1e-14));
-        assert!((on_a + on_b).norm() <= 1e-15 * most && on_a.dot(&contact.normal).abs() <= 1e-15 * most);
+        assert!((on_a + on_b).norm() <= 1e-15 * most && on_a.dot(&contact.normal).abs() <= 1e-13 * most);
         if sliding.norm() >= friction.smoothing_velocity {
             assert!((on_a + sliding.normalize() * most).norm() <= 1e-14 * most);
         }

@@ -123,9 +123,12 @@ impl Pair {
             return f64::INFINITY;
         }
         let blend = self.blend(x);
-        let mut energy = 0.0;
-        self.visit(x, closest, |c| energy += (blend.point[0] * c.point + blend.line[0] * c.line) * c.barrier.value);
-        energy
+        let (mut point, mut line) = (0.0, 0.0);
+        self.visit(x, closest, |c| {
+            point += c.point * c.barrier.value;
+            line += c.line * c.barrier.value;
+        });
+        blend.point[0] * point + blend.line[0] * line
     }
 
     /// Energy, gradient and, if asked for, second derivative; `None` where the pair is out of range.
