@@ -8,10 +8,11 @@ use common::Random;
 use flagrs::Vec3;
 use flagrs::contact::barrier::Barrier;
 use flagrs::contact::bodies::{Bodies, Body};
-use flagrs::contact::broad_phase::Search;
+use flagrs::contact::broad_phase::{BroadPhase, Search};
 use flagrs::contact::candidates::Candidates;
 use flagrs::contact::continuous::safe_part;
 use flagrs::contact::distance::segment_distance;
+use flagrs::contact::exclusion::Exclusion;
 use flagrs::contact::friction::{Friction, LaggedContact};
 use flagrs::contact::pair::{Curvature, Pair};
 use flagrs::contact::potential::{BarrierLaw, BarrierState};
@@ -396,7 +397,8 @@ fn energy_and_force_are_continuous_across_features_and_nodes() {
         (0..6).map(|k| arc(k) + shift).collect()
     };
     let at_angle = |angle: f64, centre: Vec3| rod(centre, Vec3::new(angle.cos(), angle.sin(), 0.0), 3.0, 3);
-    let motions: [(&str, Box<dyn Fn(f64) -> Vec<Vec<Vec3>>>); 4] = [
+    type Motion = Box<dyn Fn(f64) -> Vec<Vec<Vec3>>>;
+    let motions: [(&str, Motion); 4] = [
         (
             "slides across",
             Box::new(move |t| vec![bent(Vec3::zeros()), at_angle(1.2, Vec3::new(0.2 + 4.0 * t, 0.2, -XI))]),
@@ -684,7 +686,7 @@ fn rods_do_not_push_themselves_nor_their_head() {
         .map(|arc| arc / (1.05 * 0.5 * XI))
         .map(|turn| Vec3::new(turn.cos(), turn.sin(), 0.0) * (1.05 * 0.5 * XI))
         .collect();
-    let (edges, lengths) = edges_of(&[circle.clone()]);
+    let (edges, lengths) = edges_of(std::slice::from_ref(&circle));
     let (radius, colliding) = (vec![0.5 * XI; count], vec![true; count]);
     let bodies =
         |spheres: &[(usize, f64)]| Bodies::new(circle.len(), &edges, &radius, &lengths, &colliding, spheres, FRAC_PI_2);
@@ -695,6 +697,62 @@ fn rods_do_not_push_themselves_nor_their_head() {
     let (nodes, law, state) = scene_of(&[straight]);
     assert_eq!(law.energy(&state, &nodes), 0.0);
     assert!(law.forces(&state, &nodes).is_empty());
+}
+
+#[test]
+fn sphere_pushes_a_rod_alike_wherever_its_nodes_are() {
+    let (length, radius, head) = (8.0, 0.5 * XI, 0.9);
+    let distance = 1.01 * (radius + head);
+    let thickness = radius + head;
+    let expected = -thickness * (2.0 * DELTA).sqrt() * Barrier::new(thickness, DELTA).at(distance).slope;
+    for count in [2, 8, 40, 160] {
+        let mut nodes = rod(Vec3::zeros(), Vec3::x(), length, count);
+        let (edges, lengths) = edges_of(std::slice::from_ref(&nodes));
+        nodes.push(Vec3::zeros());
+        let (radii, colliding) = (vec![radius; count], vec![true; count]);
+        let spheres = [(count + 1, head)];
+        let bodies = Bodies::new(nodes.len(), &edges, &radii, &lengths, &colliding, &spheres, FRAC_PI_2);
+        let law = BarrierLaw::new(bodies, DELTA, 1.0);
+        let mut state = law.state();
+        for k in 0..50 {
+            nodes[count + 1] = Vec3::new(-1.0 + 0.04 * k as f64, 0.0, distance);
+            law.ensure(&mut state, &nodes);
+            let force = -gradient_of(&law, &state, &nodes)[count + 1];
+            assert!((force - Vec3::z() * expected).norm() < 1e-11 * expected, "{count} edges, {k}: {force}");
+        }
+    }
+}
+
+#[test]
+fn swept_search_finds_every_pair_that_comes_into_range() {
+    let mut random = Random::new(13);
+    let mut met = 0;
+    for _ in 0..40 {
+        let rods = tangle(&mut random, 4, 6);
+        let (edges, _) = edges_of(&rods);
+        let from = rods.concat();
+        let speed = 10f64.powf(between(&mut random, -2.0, 1.0));
+        let to: Vec<Vec3> = from.iter().map(|x| x + random.vector(speed)).collect();
+        let radius: Vec<f64> = (0..edges.len()).map(|_| between(&mut random, 0.02, 0.1)).collect();
+        let exclusion = Exclusion::new(from.len(), &edges, &vec![0.7; edges.len()], &radius, FRAC_PI_2);
+        let phase = BroadPhase::new(&edges, None, exclusion.clone());
+        let found = phase.clone().with_search(Search::BruteForce).swept(&from, &to, &radius).to_vec();
+        assert_eq!(found, phase.with_search(Search::Tree).swept(&from, &to, &radius));
+        for k in 0..=20 {
+            let x: Vec<Vec3> = from.iter().zip(&to).map(|(a, b)| a + (b - a) * (k as f64 / 20.0)).collect();
+            for a in 0..edges.len() {
+                for b in a + 1..edges.len() {
+                    let ([a0, a1], [b0, b1]) = (edges[a], edges[b]);
+                    let distance = segment_distance(&x[a0], &x[a1], &x[b0], &x[b1]).distance;
+                    if distance < radius[a] + radius[b] && !exclusion.excludes(a, b) {
+                        met += 1;
+                        assert!(found.contains(&[a as u32, b as u32]));
+                    }
+                }
+            }
+        }
+    }
+    assert!(met > 1000, "{met}");
 }
 
 #[test]
