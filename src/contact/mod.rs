@@ -4,9 +4,17 @@
 //! is pure geometry and runs in one direction: [`exclusion`] decides once, from the rest shape,
 //! which pairs of edges are neighbours along a rod and so can never count; [`broad_phase`] lists,
 //! for given node positions, the remaining pairs whose bounding boxes overlap; [`distance`]
+//!
 //! measures one pair, and is the only file that calls parry's segment-segment routine. Contact
 //! models stand on top of these three and add the mechanics. Lengths are in metres, but every
 //! decision is relative to the sizes at hand: nothing depends on the unit.
+//!
+//! There are two models. [`spillmann`] turns overlaps into forces, pass by pass, until they are
+//! within a tolerance. The other one is a potential that grows without bound before rods touch
+//! each other's cores: [`potential`] is the way in. Below it, [`bodies`] numbers what can touch;
+//! [`candidates`] keeps the near pairs; [`pair`] is the energy of one of them, made of a
+//! [`barrier`] on each [`separation`], weighted by their [`angle`]; [`continuous`] cuts a step before
+//! a core is reached; [`friction`] acts on the contacts of the state before.
 
 pub mod angle;
 pub mod barrier;

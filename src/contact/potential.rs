@@ -252,8 +252,8 @@ impl BarrierLaw {
         }
     }
 
-    /// The largest part in `[0, 1]` of the straight way from `from` to `to` (m) over which every pair keeps at least a tenth of
-    /// its gap above the least distance. 0 if a pair has none at `from`.
+    /// The largest part in `[0, 1]` of the straight way from `from` to `to` (m) over which every pair that comes into range
+    /// keeps at least a tenth of its gap above the least distance. 0 if a pair has none at `from`.
     ///
     /// Any displacement is allowed: if it leaves the range of the list of near pairs, the whole way is searched.
     pub fn step_limit(&self, state: &mut BarrierState, from: &[Vec3], to: &[Vec3]) -> f64 {
