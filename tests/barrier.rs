@@ -560,6 +560,34 @@ fn candidates_are_those_of_brute_force_and_stay_until_half_the_skin_is_used() {
 }
 
 #[test]
+fn list_is_made_anew_before_rods_that_approach_each_other_are_in_range() {
+    let range = (1.0 + DELTA) * XI;
+    let skin = 0.1;
+    let at = |upper: f64, middle: f64, lower: f64| {
+        let across = |height: f64| rod(Vec3::z() * height, Vec3::y(), 4.0, 2);
+        [across(upper), rod(Vec3::z() * middle, Vec3::x(), 4.0, 2), across(lower)].concat()
+    };
+    let start = at(range + 0.9 * skin, 0.0, -range - 1.1 * skin);
+    let rods: Vec<Vec<Vec3>> = start.chunks(3).map(<[Vec3]>::to_vec).collect();
+    let (_, law, _) = scene_of(&rods);
+    let law = law.with_skin(skin);
+    let mut state = law.state();
+    assert!(law.ensure(&mut state, &start));
+    assert_eq!(state.stencils().count(), 4, "the upper rod and the middle one");
+
+    // The rod outside the list is the closest one while the list still serves.
+    let approached = at(range + 1.35 * skin, 0.0, -range - 0.65 * skin);
+    assert!(!law.ensure(&mut state, &approached));
+    let closest = law.smallest_gap(&state, &approached).expect("rods may touch");
+    assert!((closest.distance - range - 0.65 * skin).abs() < 1e-14);
+
+    // Both move, by little more than half the skin each: in range.
+    let met = at(range + 0.9 * skin, -0.6 * skin, -range - 0.55 * skin);
+    assert!(law.ensure(&mut state, &met));
+    assert!(law.energy(&state, &met) > 0.0);
+}
+
+#[test]
 fn fast_crossing_pairs_never_meet() {
     let mut random = Random::new(9);
     let mut stopped = 0;
