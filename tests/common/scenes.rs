@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use flagrs::Vec3;
 use flagrs::dynamics::specification::{
-    ClampSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification, HeadSpecification,
-    MotorSpecification, Specification,
+    ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
+    HeadSpecification, MotorSpecification, Specification,
 };
 use flagrs::elastic::signal::Signal;
 
@@ -126,9 +126,16 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
     }
 }
 
-/// Contact with the default options of the Python package.
-fn contact(colliding: Vec<bool>) -> ContactSpecification {
-    ContactSpecification { tolerance: 1e-2, max_iterations: 200, exclusion: FRAC_PI_2, colliding }
+/// Contact with the default options of the Python package, the stiffness (Pa) as it takes it from the scene.
+fn contact(colliding: Vec<bool>, stiffness: f64) -> ContactSpecification {
+    let method = ContactMethodSpecification::Barrier {
+        tolerance: 0.05,
+        stiffness,
+        friction: 0.0,
+        slip_velocity: 1.0,
+        spheres: Vec::new(),
+    };
+    ContactSpecification { method, exclusion: FRAC_PI_2, colliding }
 }
 
 /// Regularization of the robot's fluid, m.
@@ -176,7 +183,7 @@ pub fn robot(normalized_pitch: f64, rpm: f64) -> Specification {
     if let Some(fluid) = &mut scene.fluid {
         fluid.immersed.clone_from(&outside);
     }
-    scene.contact = Some(contact(outside));
+    scene.contact = Some(contact(outside, 4.94e3));
     scene
 }
 
@@ -214,7 +221,7 @@ pub fn clamped_flagella(count: usize) -> Specification {
             velocity: Vec3::zeros(),
         })
         .collect();
-    scene.contact = Some(contact(vec![true; scene.edges.len()]));
+    scene.contact = Some(contact(vec![true; scene.edges.len()], 1.076e4));
     scene
 }
 
