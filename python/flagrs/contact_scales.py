@@ -18,9 +18,14 @@ SLIP_SHARE = 1e-3
 FREE_ROOT = 4.73
 
 
+#: A contact gathers the load of stretches to both sides: forces per length of contact over the typical one.
+GATHERED = 5.0
+
+
 def force_per_length(scene: Scene) -> float:
-    """Return the largest of the scene's typical forces per length [N/m]: of bending, drag, weight."""
-    return max(max(_bending(rod), _drag(scene, rod), _weight(scene, rod)) for rod in scene.rods)
+    """Return the scene's typical force per length [N/m]: drag of what turns, or weight; of bending if neither."""
+    driven = max(max(_drag(scene, rod), _weight(scene, rod)) for rod in scene.rods)
+    return driven if driven > 0.0 else max(_bending(rod) for rod in scene.rods)
 
 
 def typical_velocity(scene: Scene) -> float:
@@ -36,7 +41,7 @@ def barrier_stiffness(scene: Scene, contact: Contact) -> float:
         return contact.stiffness
     thickness = 2.0 * max(float(rod.radius_array().max()) for rod in scene.rods)
     reach = 2.0 * contact.tolerance_or_default() * thickness
-    return force_per_length(scene) / (MIDDLE_SLOPE * reach)
+    return GATHERED * force_per_length(scene) / (MIDDLE_SLOPE * reach)
 
 
 def slip_velocity(scene: Scene, contact: Contact) -> float:

@@ -270,11 +270,14 @@ impl Balance {
     }
 
     /// Part of the way between two sets of degrees of freedom over which contact lets the nodes go.
-    pub fn step_limit(&mut self, model: &Model, from: &[f64], to: &[f64]) -> f64 {
-        match (model.barrier(), &mut self.barrier) {
+    pub fn step_limit(&mut self, model: &Model, from: &[f64], to: &[f64], statistics: &mut Statistics) -> f64 {
+        let start = Instant::now();
+        let limit = match (model.barrier(), &mut self.barrier) {
             (Some(law), Some(barrier)) => barrier.step_limit(law, model.network.node_dofs(), from, to),
             _ => 1.0,
-        }
+        };
+        statistics.seconds_contact += start.elapsed().as_secs_f64();
+        limit
     }
 
     /// Largest force per displacement that inertia and drag exert within the step, N/m.
@@ -295,13 +298,13 @@ impl Balance {
         trial: &Unknowns,
         statistics: &mut Statistics,
     ) -> Option<Size> {
-        let start = Instant::now();
-        let size = self.residual(model, step, trial);
-        statistics.seconds_assembly += start.elapsed().as_secs_f64();
+        let (start, contact) = (Instant::now(), statistics.seconds_contact);
+        let size = self.residual(model, step, trial, statistics);
+        statistics.seconds_assembly += start.elapsed().as_secs_f64() - (statistics.seconds_contact - contact);
         size
     }
 
-    fn residual(&mut self, model: &Model, step: &Step, trial: &Unknowns) -> Option<Size> {
+    fn residual(&mut self, model: &Model, step: &Step, trial: &Unknowns, statistics: &mut Statistics) -> Option<Size> {
         let q = &trial.q;
         self.shafts.clear();
         self.shafts.extend(model.motors.iter().zip(&step.motor_angles).map(|(motor, &angle)| motor.shaft(angle, q)));
@@ -321,7 +324,9 @@ impl Balance {
         model.dissipative.iter().for_each(|term| term.add(&self.configuration, &increment, &mut out));
         if let (Some(law), Some(barrier)) = (model.barrier(), &mut self.barrier) {
             let dofs = model.network.node_dofs();
+            let start = Instant::now();
             barrier.add_forces(law, dofs, q, &increment, &mut self.elastic, &mut self.residual);
+            statistics.seconds_contact += start.elapsed().as_secs_f64();
         }
         self.add_fluid(step, trial)?;
         for (motor, torque) in model.motors.iter().zip(&step.motor_torques) {

@@ -104,7 +104,7 @@ impl Newton<'_, '_> {
     /// The part of the direction that contact allows.
     fn full_length(&mut self) -> f64 {
         self.work.try_length(self.unknowns, 1.0);
-        self.balance.step_limit(self.model, &self.unknowns.q, &self.work.trial.q)
+        self.balance.step_limit(self.model, &self.unknowns.q, &self.work.trial.q, self.statistics)
     }
 
     fn accept(&mut self) {

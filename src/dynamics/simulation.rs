@@ -374,7 +374,7 @@ impl Simulation {
         };
         let law = model.contact.as_ref().and_then(ContactModel::spillmann);
         let (Some(law), Some(contact)) = (law, contact) else {
-            keep_apart(balance, model, &state.q, &mut trial.q)?;
+            keep_apart(balance, model, &state.q, &mut trial.q, statistics)?;
             newton::solve(balance, model, &step, settings, work, trial, statistics).map_err(failed)?;
             return Ok(step.motor_angles);
         };
@@ -449,7 +449,13 @@ impl Simulation {
 }
 
 /// Shortens the way from the beginning of a step to the guess at its end to what contact allows.
-fn keep_apart(balance: &mut Balance, model: &Model, from: &[f64], guess: &mut [f64]) -> Result<(), TryError> {
+fn keep_apart(
+    balance: &mut Balance,
+    model: &Model,
+    from: &[f64],
+    guess: &mut [f64],
+    statistics: &mut Statistics,
+) -> Result<(), TryError> {
     if model.barrier().is_none() {
         return Ok(());
     }
@@ -458,10 +464,10 @@ fn keep_apart(balance: &mut Balance, model: &Model, from: &[f64], guess: &mut [f
     prescribed.filter(|(held, _)| **held).for_each(|(_, (start, end))| *start = *end);
     let blocked =
         |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: 0, reason: reason.to_owned() };
-    if balance.step_limit(model, from, &start) < 1.0 {
+    if balance.step_limit(model, from, &start, statistics) < 1.0 {
         return Err(blocked("what is prescribed moves filaments into each other"));
     }
-    let limit = balance.step_limit(model, &start, guess);
+    let limit = balance.step_limit(model, &start, guess, statistics);
     if limit < 1.0 {
         guess.iter_mut().zip(&start).for_each(|(guess, start)| *guess = start + limit * (*guess - start));
     }
