@@ -23,7 +23,7 @@ GATHERED = 5.0
 
 
 def force_per_length(scene: Scene) -> float:
-    """Return the scene's typical force per length [N/m]: drag of what turns, or weight; of bending if neither."""
+    """Return the typical force per length [N/m]: drag of what turns, or weight; of bending if neither."""
     driven = max(max(_drag(scene, rod), _weight(scene, rod)) for rod in scene.rods)
     return driven if driven > 0.0 else max(_bending(rod) for rod in scene.rods)
 
