@@ -3,11 +3,13 @@
 //! * [`lanes`]: vectors of numbers on every machine's instructions, chosen at run time (all `unsafe` of the crate).
 //! * [`segment`]: integrals of a regularized Stokeslet over a straight segment.
 //! * [`stokeslet`]: mobility matrix, velocity field and hat-function weights of segment networks.
+//! * [`far_field`]: the mobility's product with a force density in time proportional to the number of nodes.
 //! * [`rss`]: nonlocal drag by regularized Stokeslet segments.
 //! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
 //! * [`twist_drag`]: resistance of an edge to spinning about its own centreline.
 //! * [`head`]: drag and counter-torque of the seed's head.
 
+pub mod far_field;
 pub mod head;
 pub mod lanes;
 pub mod rft;
