@@ -44,6 +44,12 @@ pub(crate) trait Lanes:
     /// The same for every vector of a tile.
     fn per_vector<T: Copy>(value: T) -> Self::PerVector<T>;
 
+    /// Eight numbers, in as many vectors as they take.
+    type Octet: Copy + AsRef<[Self]>;
+
+    /// The vectors of eight numbers, made one by one from their places.
+    fn octet(make: impl FnMut(usize) -> Self) -> Self::Octet;
+
     /// The same value in every lane.
     fn splat(value: f64) -> Self;
 

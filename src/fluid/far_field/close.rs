@@ -1,11 +1,11 @@
 //! Pairs of a target and an edge too close for Gauss points: what the exact integral adds to them.
 
-use super::lanes::Width;
 use super::near;
 use super::sources::{Edge, Source};
 use super::tree::squared_distance;
 use crate::Vec3;
-use crate::fluid::segment::{Blocks, Collect, Segment, Symmetric, for_each_target};
+use crate::fluid::lanes::Path;
+use crate::fluid::segment::{Blocks, Segment, Symmetric, for_each_target};
 
 /// The targets of a leaf and the edges that may be close to some of them.
 pub(crate) struct Neighbourhood<'a> {
@@ -26,7 +26,7 @@ pub(crate) struct Neighbourhood<'a> {
     pub runs: &'a [std::ops::Range<u32>],
     /// Distance from an edge's centre below which a target is close, in half-lengths.
     pub close: f64,
-    pub width: Width,
+    pub path: Path,
 }
 
 /// Room for the close targets of an edge.
@@ -35,8 +35,8 @@ pub(crate) struct Scratch {
     rows: Vec<u32>,
     targets: Vec<Vec3>,
     tree_targets: Vec<[f64; 3]>,
-    blocks: Vec<Blocks>,
-    gauss: Vec<Symmetric>,
+    blocks: Vec<Blocks<f64>>,
+    gauss: Vec<Symmetric<f64>>,
     entries: Vec<Entry>,
 }
 
@@ -58,7 +58,7 @@ impl Scratch {
 pub(crate) struct Entry {
     row: u32,
     node: u32,
-    block: Symmetric,
+    block: Symmetric<f64>,
 }
 
 /// Memory that a close pair takes at most: a block for each end.
@@ -127,7 +127,7 @@ impl Neighbourhood<'_> {
     }
 
     /// Hands on the exact blocks of every close pair, less those of the Gauss points.
-    fn for_each_pair(&self, scratch: &mut Scratch, mut take: impl FnMut(u32, &Edge, &Blocks)) {
+    fn for_each_pair(&self, scratch: &mut Scratch, mut take: impl FnMut(u32, &Edge, &Blocks<f64>)) {
         let gauss = self.rule.len();
         for (place, edge, centre) in self.candidates() {
             scratch.rows.clear();
@@ -138,9 +138,10 @@ impl Neighbourhood<'_> {
             scratch.take(self);
             let [start, end] = edge.nodes.map(|node| &self.nodes[node as usize]);
             let segment = Segment::new(start, end, self.epsilon[edge.index as usize]);
-            for_each_target(&segment, &scratch.targets, &mut Keep(&mut scratch.blocks));
+            let exact = &mut scratch.blocks;
+            for_each_target(self.path, &segment, &scratch.targets, |_, blocks| exact.push(*blocks));
             for (source, [point, weight]) in self.sources[place * gauss..].iter().zip(self.rule) {
-                near::blocks(self.width, source, &scratch.tree_targets, &mut scratch.gauss);
+                near::blocks(self.path, source, &scratch.tree_targets, &mut scratch.gauss);
                 let (at_start, at_end) = ((1.0 - point) * weight * edge.length, point * weight * edge.length);
                 for (blocks, gauss) in scratch.blocks.iter_mut().zip(&scratch.gauss) {
                     for k in 0..6 {
@@ -153,16 +154,6 @@ impl Neighbourhood<'_> {
                 take(*row, edge, blocks);
             }
         }
-    }
-}
-
-/// Keeps the blocks of an edge in the order of its targets.
-struct Keep<'a>(&'a mut Vec<Blocks>);
-
-impl Collect for Keep<'_> {
-    #[inline(always)]
-    fn collect(&mut self, _: usize, blocks: &Blocks) {
-        self.0.push(*blocks);
     }
 }
 

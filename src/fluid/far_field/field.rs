@@ -1,10 +1,11 @@
 //! The flow of a local expansion at the targets of its cell.
 
 use super::harmonics::{Harmonics, MAX_COEFFICIENTS};
-use super::lanes::{Eight, Four, Lanes, for_width};
+use super::octet::{Eight, Four, Octet, on_path};
 use super::translation::Place;
+use crate::fluid::lanes::Lanes;
 
-for_width! {
+on_path! {
     /// Adds the flow of the local expansion (module [`super::sources`]) at every target.
     pub(crate) fn evaluate(
         harmonics: &Harmonics,
@@ -16,7 +17,7 @@ for_width! {
 }
 
 #[inline(always)]
-fn evaluate_as<V: Lanes>(
+fn evaluate_as<L: Lanes>(
     harmonics: &Harmonics,
     place: &Place,
     local: &[Four],
@@ -43,10 +44,13 @@ fn evaluate_as<V: Lanes>(
                 from[k].0[lane] = target[k] - place.centre[k];
             }
         }
-        harmonics.evaluate(std::array::from_fn(|k| V::load(&from[k]).times(V::splat(inverse))), &mut values);
-        let mut sums = [[V::zero(); 2]; 8];
+        harmonics.evaluate(
+            std::array::from_fn(|k| Octet::<L>::load(&from[k]).times(Octet::<L>::splat(inverse))),
+            &mut values,
+        );
+        let mut sums = [[Octet::<L>::zero(); 2]; 8];
         for (value, [first, second]) in values[..local.len()].iter().zip(&fields) {
-            let (first, second) = (V::load(first), V::load(second));
+            let (first, second) = (Octet::<L>::load(first), Octet::<L>::load(second));
             for (lane, [a, b]) in sums.iter_mut().enumerate() {
                 *a = first.fma_scalar(value.0[lane], *a);
                 *b = second.fma_scalar(value.0[lane], *b);

@@ -11,7 +11,8 @@
 //! them by orthogonal matrices. Coefficients of degree n are stored together from `n^2` on: `U` of even m, `U` of odd m, `V`
 //! of odd m, `V` of even m, the four families that [`super::rotation`] treats alike.
 
-use super::lanes::{Eight, Lanes};
+use super::octet::{Eight, Octet};
+use crate::fluid::lanes::Lanes;
 
 /// Highest degree there are tables for.
 pub(crate) const MAX_ORDER: usize = 24;
@@ -100,12 +101,12 @@ impl Harmonics {
 
     /// Fills `out` with all harmonics at eight points.
     #[inline(always)]
-    pub fn evaluate<V: Lanes>(&self, [x, y, z]: [V; 3], out: &mut [Eight]) {
+    pub fn evaluate<L: Lanes>(&self, [x, y, z]: [Octet<L>; 3], out: &mut [Eight]) {
         let r_squared = x.fma(x, y.fma(y, z.times(z)));
-        let (mut u, mut v) = (V::splat(1.0), V::zero());
+        let (mut u, mut v) = (Octet::<L>::splat(1.0), Octet::<L>::zero());
         for m in 0..=self.order {
             if m > 0 {
-                let factor = V::splat(self.diagonal[m]);
+                let factor = Octet::<L>::splat(self.diagonal[m]);
                 let (x, y) = (x.times(factor), y.times(factor));
                 (u, v) = (v.fnma(y, u.times(x)), u.fma(y, v.times(x)));
                 self.climb_from(m, v, imaginary, z, r_squared, out);
@@ -115,20 +116,20 @@ impl Harmonics {
     }
 
     #[inline(always)]
-    fn climb_from<V: Lanes>(
+    fn climb_from<L: Lanes>(
         &self,
         m: usize,
-        start: V,
+        start: Octet<L>,
         place: impl Fn(usize, usize) -> usize,
-        z: V,
-        r_squared: V,
+        z: Octet<L>,
+        r_squared: Octet<L>,
         out: &mut [Eight],
     ) {
-        let (mut below, mut current) = (V::zero(), start);
+        let (mut below, mut current) = (Octet::<L>::zero(), start);
         current.store(&mut out[place(m, m)]);
         for n in m + 1..=self.order {
             let [first, second] = self.climb[real(n, m)];
-            let lower = below.times(r_squared).times(V::splat(-second));
+            let lower = below.times(r_squared).times(Octet::<L>::splat(-second));
             (below, current) = (current, current.times(z).fma_scalar(first, lower));
             current.store(&mut out[place(n, m)]);
         }
@@ -176,14 +177,22 @@ fn ladder(order: usize) -> Vec<Rung> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::Plain;
+    use super::super::octet::on_path;
     use super::*;
+    use crate::fluid::lanes::Path;
+
+    on_path! { fn evaluate(harmonics: &Harmonics, point: [f64; 3], out: &mut [Eight]) = evaluate_as }
+
+    #[inline(always)]
+    fn evaluate_as<L: Lanes>(harmonics: &Harmonics, point: [f64; 3], out: &mut [Eight]) {
+        harmonics.evaluate(point.map(Octet::<L>::splat), out);
+    }
 
     const ORDER: usize = 8;
 
     fn at(harmonics: &Harmonics, point: [f64; 3]) -> Vec<f64> {
         let mut out = vec![Eight::ZERO; coefficients(ORDER)];
-        harmonics.evaluate(point.map(Plain::splat), &mut out);
+        evaluate(Path::chosen(), harmonics, point, &mut out);
         out.iter().map(|value| value.0[3]).collect()
     }
 

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use super::lanes::{Eight, Lanes, for_width};
+use super::octet::{Eight, Octet, on_path};
 use super::sources::Source;
+use crate::fluid::lanes::Lanes;
 use crate::fluid::segment::Symmetric;
 
-for_width! {
+on_path! {
     /// Adds the flow of several runs of sources at every target.
     pub(crate) fn add_near(
         sources: &[Source],
@@ -16,23 +17,23 @@ for_width! {
     ) = add_near_as
 }
 
-for_width! {
+on_path! {
     /// Fills `out` with the block of a Gauss point of weight one at every target.
     ///
     /// Its inverse distances are those of [`add_near`] to the last bit, so that taking blocks off again leaves nothing but
     /// the round-off of a few sums, however close the target.
-    pub(crate) fn blocks(source: &Source, targets: &[[f64; 3]], out: &mut [Symmetric]) = blocks_as
+    pub(crate) fn blocks(source: &Source, targets: &[[f64; 3]], out: &mut [Symmetric<f64>]) = blocks_as
 }
 
 #[inline(always)]
-fn add_near_as<V: Lanes>(sources: &[Source], runs: &[Range<u32>], targets: &[[f64; 3]], out: &mut [[f64; 3]]) {
+fn add_near_as<L: Lanes>(sources: &[Source], runs: &[Range<u32>], targets: &[[f64; 3]], out: &mut [[f64; 3]]) {
     for (targets, out) in targets.chunks(8).zip(out.chunks_mut(8)) {
-        let at = columns::<V>(targets);
-        let (mut u, mut v, mut w) = (V::zero(), V::zero(), V::zero());
+        let at = columns::<L>(targets);
+        let (mut u, mut v, mut w) = (Octet::<L>::zero(), Octet::<L>::zero(), Octet::<L>::zero());
         for run in runs {
             for source in &sources[run.start as usize..run.end as usize] {
                 let Pair { x, y, z, inverse, cube } = Pair::new(at, source);
-                let [p, q, r] = source.force.map(V::splat);
+                let [p, q, r] = source.force.map(Octet::<L>::splat);
                 let along = x.fma(p, y.fma(q, z.times(r))).times(cube);
                 let even = cube.fma_scalar(source.epsilon_squared, inverse);
                 u = even.fma(p, x.fma(along, u));
@@ -53,9 +54,9 @@ fn add_near_as<V: Lanes>(sources: &[Source], runs: &[Range<u32>], targets: &[[f6
 }
 
 #[inline(always)]
-fn blocks_as<V: Lanes>(source: &Source, targets: &[[f64; 3]], out: &mut [Symmetric]) {
+fn blocks_as<L: Lanes>(source: &Source, targets: &[[f64; 3]], out: &mut [Symmetric<f64>]) {
     for (targets, out) in targets.chunks(8).zip(out.chunks_mut(8)) {
-        let Pair { x, y, z, inverse, cube } = Pair::new(columns::<V>(targets), source);
+        let Pair { x, y, z, inverse, cube } = Pair::new(columns::<L>(targets), source);
         let even = cube.fma_scalar(source.epsilon_squared, inverse);
         let (a, b, c) = (x.times(cube), y.times(cube), z.times(cube));
         let entries = [x.fma(a, even), x.times(b), x.times(c), y.fma(b, even), y.times(c), z.fma(c, even)];
@@ -70,19 +71,19 @@ fn blocks_as<V: Lanes>(source: &Source, targets: &[[f64; 3]], out: &mut [Symmetr
 }
 
 /// Eight targets beside a source: offsets, `1 / R` and `1 / R^3`.
-struct Pair<V> {
-    x: V,
-    y: V,
-    z: V,
-    inverse: V,
-    cube: V,
+struct Pair<L: Lanes> {
+    x: Octet<L>,
+    y: Octet<L>,
+    z: Octet<L>,
+    inverse: Octet<L>,
+    cube: Octet<L>,
 }
 
-impl<V: Lanes> Pair<V> {
+impl<L: Lanes> Pair<L> {
     #[inline(always)]
-    fn new(at: [V; 3], source: &Source) -> Self {
-        let [x, y, z]: [V; 3] = std::array::from_fn(|k| at[k].minus(V::splat(source.position[k])));
-        let r_squared = x.fma(x, y.fma(y, z.fma(z, V::splat(source.epsilon_squared))));
+    fn new(at: [Octet<L>; 3], source: &Source) -> Self {
+        let [x, y, z]: [Octet<L>; 3] = std::array::from_fn(|k| at[k].minus(Octet::<L>::splat(source.position[k])));
+        let r_squared = x.fma(x, y.fma(y, z.fma(z, Octet::<L>::splat(source.epsilon_squared))));
         let inverse = r_squared.inverse_root();
         Self { x, y, z, inverse, cube: inverse.times(inverse).times(inverse) }
     }
@@ -90,12 +91,12 @@ impl<V: Lanes> Pair<V> {
 
 /// Up to eight points by coordinates; lanes without one repeat the first.
 #[inline(always)]
-fn columns<V: Lanes>(points: &[[f64; 3]]) -> [V; 3] {
+fn columns<L: Lanes>(points: &[[f64; 3]]) -> [Octet<L>; 3] {
     std::array::from_fn(|k| {
         let mut column = Eight([points[0][k]; 8]);
         for (value, point) in column.0.iter_mut().zip(points) {
             *value = point[k];
         }
-        V::load(&column)
+        Octet::<L>::load(&column)
     })
 }

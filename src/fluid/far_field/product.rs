@@ -7,7 +7,7 @@ use std::cell::RefCell;
 
 use super::accuracy::gauss_rule;
 use super::close::Scratch;
-use super::lanes::Four;
+use super::octet::Four;
 use super::sources::{self, Source};
 use super::translation::Work;
 use super::{FarField, field, near, translation};
@@ -48,7 +48,7 @@ impl FarField {
             let edges = &self.tree_edges[tree.cells[cell].items()];
             sources::charge(edges, gauss_rule(self.accuracy.gauss), density, points);
             if needed {
-                sources::multipole(self.width, &self.harmonics, place(cell), points, &mut multipoles[..count]);
+                sources::multipole(self.path, &self.harmonics, place(cell), points, &mut multipoles[..count]);
             }
             return;
         };
@@ -65,7 +65,7 @@ impl FarField {
             let given = [&first[..count], &second[..count]];
             let places = [place(left), place(right)];
             WORK.with_borrow_mut(|work| {
-                translation::to_parent(self.width, &self.translation, work, place(cell), places, given, own);
+                translation::to_parent(self.path, &self.translation, work, place(cell), places, given, own);
             });
         }
     }
@@ -83,7 +83,7 @@ impl FarField {
         parallel: bool,
     ) {
         let (tree, count) = (&self.target_tree, self.translation.count());
-        let (place, width) = (&tree.places[cell], self.width);
+        let (place, path) = (&tree.places[cell], self.path);
         let (own, halves) = locals.split_at_mut(count);
         if !carried {
             own.fill(Four::ZERO);
@@ -92,14 +92,14 @@ impl FarField {
         if !far.is_empty() {
             let (places, given) = (&self.source_tree.places, &self.multipoles);
             WORK.with_borrow_mut(|work| {
-                translation::to_local(width, &self.translation, work, place, far, places, given, own);
+                translation::to_local(path, &self.translation, work, place, far, places, given, own);
             });
         }
         let carried = carried || !far.is_empty();
         let Some([left, right]) = tree.halves(cell) else {
             flow.fill([0.0; 3]);
             if carried {
-                field::evaluate(width, &self.harmonics, place, own, &self.targets[tree.cells[cell].items()], flow);
+                field::evaluate(path, &self.harmonics, place, own, &self.targets[tree.cells[cell].items()], flow);
             }
             self.add_nearby(self.leaf_of[cell] as usize, density, flow);
             return;
@@ -111,7 +111,7 @@ impl FarField {
             second.fill(Four::ZERO);
             let places = [&tree.places[left], &tree.places[right]];
             WORK.with_borrow_mut(|work| {
-                translation::to_children(width, &self.translation, work, place, places, own, [first, second]);
+                translation::to_children(path, &self.translation, work, place, places, own, [first, second]);
             });
         }
         let (before, after) = flow.split_at_mut(tree.cells[left].count());
@@ -126,7 +126,7 @@ impl FarField {
     /// Adds the flow of all that is near a leaf.
     fn add_nearby(&self, leaf: usize, density: &[f64], flow: &mut [[f64; 3]]) {
         let leaf = &self.leaves[leaf];
-        near::add_near(self.width, &self.sources, &leaf.runs, &self.targets[leaf.targets.clone()], flow);
+        near::add_near(self.path, &self.sources, &leaf.runs, &self.targets[leaf.targets.clone()], flow);
         match &leaf.blocks {
             Some(blocks) => blocks.iter().for_each(|block| block.add(density, flow)),
             None => self.neighbourhood(leaf).add(density, &mut Scratch::default(), flow),

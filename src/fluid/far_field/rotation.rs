@@ -6,8 +6,9 @@
 //! `order^3`.
 
 use super::harmonics::{MAX_ORDER, families, full_norm};
-use super::lanes::{Eight, Lanes};
+use super::octet::{Eight, Octet};
 use super::square;
+use crate::fluid::lanes::Lanes;
 
 /// The matrix of the swap of x and z, degree by degree.
 pub(crate) struct Swap {
@@ -55,7 +56,7 @@ impl Swap {
 
     /// Fills `out` with the harmonics, or the coefficients, up to a degree in swapped axes.
     #[inline(always)]
-    pub fn apply<V: Lanes>(&self, order: usize, values: &[Eight], out: &mut [Eight]) {
+    pub fn apply<L: Lanes>(&self, order: usize, values: &[Eight], out: &mut [Eight]) {
         let mut entries = self.entries.as_slice();
         for n in 0..=order {
             let (values, out) = (&values[n * n..(n + 1) * (n + 1)], &mut out[n * n..(n + 1) * (n + 1)]);
@@ -65,7 +66,7 @@ impl Swap {
                 let (values, out) = (&values[starts[from]..starts[from + 1]], &mut out[starts[k]..starts[k + 1]]);
                 let (block, rest) = entries.split_at(values.len() * values.len());
                 entries = rest;
-                square::multiply::<V>(block, values, out);
+                square::multiply::<L>(block, values, out);
             }
         }
     }
@@ -104,8 +105,8 @@ pub(crate) const NO_MULTIPLES: Multiples = [[[Eight::ZERO; 2]; MAX_ORDER / 2 + 1
 
 /// Fills `out` with the multiples up to an order, from cosine and sine of the angle.
 #[inline(always)]
-pub(crate) fn multiples<V: Lanes>(order: usize, cosine: V, sine: V, [even, odd]: &mut Multiples) {
-    let (mut c, mut s) = (V::splat(1.0), V::zero());
+pub(crate) fn multiples<L: Lanes>(order: usize, cosine: Octet<L>, sine: Octet<L>, [even, odd]: &mut Multiples) {
+    let (mut c, mut s) = (Octet::<L>::splat(1.0), Octet::<L>::zero());
     let mut next = |out: &mut [Eight; 2]| {
         c.store(&mut out[0]);
         s.store(&mut out[1]);
@@ -120,22 +121,22 @@ pub(crate) fn multiples<V: Lanes>(order: usize, cosine: V, sine: V, [even, odd]:
 /// Turns harmonics by the angle whose [`multiples`] are given: `Y^m` becomes `e^(i m angle) Y^m`; by the opposite angle
 /// if `BACK`.
 #[inline(always)]
-pub(crate) fn turn<V: Lanes, const BACK: bool>(order: usize, [even, odd]: &Multiples, values: &mut [Eight]) {
+pub(crate) fn turn<L: Lanes, const BACK: bool>(order: usize, [even, odd]: &Multiples, values: &mut [Eight]) {
     for n in 1..=order {
         let [_, u_odd, v_odd, v_even, _] = families(n);
         let (u, v) = values[n * n..(n + 1) * (n + 1)].split_at_mut(v_odd);
         let (u_even, u_odd) = u.split_at_mut(u_odd);
         let (v_odd, v_even) = v.split_at_mut(v_even - v_odd);
-        turn_family::<V, BACK>(&even[1..], &mut u_even[1..], v_even);
-        turn_family::<V, BACK>(odd, u_odd, v_odd);
+        turn_family::<L, BACK>(&even[1..], &mut u_even[1..], v_even);
+        turn_family::<L, BACK>(odd, u_odd, v_odd);
     }
 }
 
 #[inline(always)]
-fn turn_family<V: Lanes, const BACK: bool>(multiples: &[[Eight; 2]], u: &mut [Eight], v: &mut [Eight]) {
+fn turn_family<L: Lanes, const BACK: bool>(multiples: &[[Eight; 2]], u: &mut [Eight], v: &mut [Eight]) {
     for (([c, s], at), beside) in multiples.iter().zip(u).zip(v) {
-        let (c, s) = (V::load(c), V::load(s));
-        let (u, v) = (V::load(at), V::load(beside));
+        let (c, s) = (Octet::<L>::load(c), Octet::<L>::load(s));
+        let (u, v) = (Octet::<L>::load(at), Octet::<L>::load(beside));
         let (turned_u, turned_v) = if BACK {
             (v.fma(s, u.times(c)), u.fnma(s, v.times(c)))
         } else {
@@ -149,8 +150,34 @@ fn turn_family<V: Lanes, const BACK: bool>(multiples: &[[Eight; 2]], u: &mut [Ei
 #[cfg(test)]
 mod tests {
     use super::super::harmonics::{Harmonics, coefficients};
-    use super::super::lanes::Plain;
+    use super::super::octet::on_path;
     use super::*;
+    use crate::fluid::lanes::Path;
+
+    on_path! { fn evaluate(point: [f64; 3], out: &mut [Eight]) = evaluate_as }
+    on_path! { fn swap(values: &[Eight], out: &mut [Eight]) = swap_as }
+    on_path! { fn turn_by(angle: f64, back: bool, values: &mut [Eight]) = turn_by_as }
+
+    #[inline(always)]
+    fn evaluate_as<L: Lanes>(point: [f64; 3], out: &mut [Eight]) {
+        Harmonics::new(MAX_ORDER).evaluate(point.map(Octet::<L>::splat), out);
+    }
+
+    #[inline(always)]
+    fn swap_as<L: Lanes>(values: &[Eight], out: &mut [Eight]) {
+        Swap::new(MAX_ORDER).apply::<L>(MAX_ORDER, values, out);
+    }
+
+    #[inline(always)]
+    fn turn_by_as<L: Lanes>(angle: f64, back: bool, values: &mut [Eight]) {
+        let mut table = NO_MULTIPLES;
+        multiples(MAX_ORDER, Octet::<L>::splat(angle.cos()), Octet::<L>::splat(angle.sin()), &mut table);
+        if back {
+            turn::<L, true>(MAX_ORDER, &table, values);
+        } else {
+            turn::<L, false>(MAX_ORDER, &table, values);
+        }
+    }
 
     fn worst(a: &[Eight], b: &[Eight]) -> f64 {
         a.iter().zip(b).fold(0.0, |worst: f64, (a, b)| worst.max((a.0[5] - b.0[5]).abs()))
@@ -158,7 +185,7 @@ mod tests {
 
     fn at(point: [f64; 3]) -> Vec<Eight> {
         let mut out = vec![Eight::ZERO; coefficients(MAX_ORDER)];
-        Harmonics::new(MAX_ORDER).evaluate(point.map(Plain::splat), &mut out);
+        evaluate(Path::chosen(), point, &mut out);
         out
     }
 
@@ -166,10 +193,9 @@ mod tests {
     fn swapped_harmonics_are_those_of_the_swapped_point() {
         let (values, direct) = (at([0.6, -0.5, 0.3]), at([0.3, -0.5, 0.6]));
         let (mut swapped, mut back) = (values.clone(), values.clone());
-        let swap = Swap::new(MAX_ORDER);
-        swap.apply::<Plain>(MAX_ORDER, &values, &mut swapped);
+        swap(Path::chosen(), &values, &mut swapped);
         assert!(worst(&direct, &swapped) < 1e-13, "{:e}", worst(&direct, &swapped));
-        swap.apply::<Plain>(MAX_ORDER, &swapped, &mut back);
+        swap(Path::chosen(), &swapped, &mut back);
         assert!(worst(&values, &back) < 1e-13, "{:e}", worst(&values, &back));
     }
 
@@ -178,11 +204,9 @@ mod tests {
         let (sine, cosine) = 0.7_f64.sin_cos();
         let mut values = at([0.6, -0.5, 0.3]);
         let direct = at([0.6 * cosine + 0.5 * sine, 0.6 * sine - 0.5 * cosine, 0.3]);
-        let mut table = NO_MULTIPLES;
-        multiples(MAX_ORDER, Plain::splat(cosine), Plain::splat(sine), &mut table);
-        turn::<Plain, false>(MAX_ORDER, &table, &mut values);
+        turn_by(Path::chosen(), 0.7, false, &mut values);
         assert!(worst(&direct, &values) < 1e-14, "{:e}", worst(&direct, &values));
-        turn::<Plain, true>(MAX_ORDER, &table, &mut values);
+        turn_by(Path::chosen(), 0.7, true, &mut values);
         assert!(worst(&at([0.6, -0.5, 0.3]), &values) < 1e-14);
     }
 }

@@ -12,8 +12,9 @@
 //! dipoles `eps^2 q / 2` (Tornberg and Greengard, J. Comput. Phys. 227 (2008) 1613, extended by the regularization).
 
 use super::harmonics::{Harmonics, MAX_COEFFICIENTS};
-use super::lanes::{Eight, Four, Lanes, for_width};
+use super::octet::{Eight, Four, Octet, on_path};
 use super::translation::Place;
+use crate::fluid::lanes::Lanes;
 
 /// A Gauss point of an edge and the force there.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +45,7 @@ pub(crate) fn charge(edges: &[Edge], rule: &[[f64; 2]], density: &[f64], sources
     }
 }
 
-for_width! {
+on_path! {
     /// Sets the multipole of a cell from its sources.
     pub(crate) fn multipole(
         harmonics: &Harmonics,
@@ -55,7 +56,7 @@ for_width! {
 }
 
 #[inline(always)]
-fn multipole_as<V: Lanes>(harmonics: &Harmonics, place: &Place, sources: &[Source], out: &mut [Four]) {
+fn multipole_as<L: Lanes>(harmonics: &Harmonics, place: &Place, sources: &[Source], out: &mut [Four]) {
     let count = out.len();
     let mut values = [Eight::ZERO; MAX_COEFFICIENTS];
     // phi, chi without its dipoles, the dipoles.
@@ -74,11 +75,11 @@ fn multipole_as<V: Lanes>(harmonics: &Harmonics, place: &Place, sources: &[Sourc
             let chi = from[0] * q[0] + from[1] * q[1] + from[2] * q[2];
             charges[lane] = Eight([q[0], q[1], q[2], chi, half * q[0], half * q[1], half * q[2], 0.0]);
         }
-        harmonics.evaluate(std::array::from_fn(|k| V::load(&point[k])), &mut values);
-        let charges = charges.map(|charge| V::load(&charge));
+        harmonics.evaluate(std::array::from_fn(|k| Octet::<L>::load(&point[k])), &mut values);
+        let charges = charges.map(|charge| Octet::<L>::load(&charge));
         for (moment, value) in moments[..count].iter_mut().zip(&values) {
             // Two sums, so that neither waits long for itself.
-            let (mut even, mut odd) = (V::load(moment), V::zero());
+            let (mut even, mut odd) = (Octet::<L>::load(moment), Octet::<L>::zero());
             for k in 0..4 {
                 even = charges[2 * k].fma_scalar(value.0[2 * k], even);
                 odd = charges[2 * k + 1].fma_scalar(value.0[2 * k + 1], odd);

@@ -14,9 +14,10 @@
 //! changes with the centre, by the other three.
 
 use super::harmonics::{MAX_COEFFICIENTS, MAX_ORDER, coefficients, factorial, imaginary, norm, real};
-use super::lanes::{Eight, Four, Lanes, for_width};
+use super::octet::{Eight, Four, Octet, on_path};
 use super::rotation::{Multiples, NO_MULTIPLES, Swap, multiples, turn};
 use super::square;
+use crate::fluid::lanes::Lanes;
 
 /// Where an expansion sits: its centre and the length its coefficients are measured in.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +90,7 @@ fn places(order: usize, first: usize, place: fn(usize, usize) -> usize) -> Vec<u
     (first..=order).flat_map(|m| (m..=order).map(move |n| place(n, m) as u16)).collect()
 }
 
-for_width! {
+on_path! {
     /// Sets the multipole of a cell from those of its two halves.
     pub(crate) fn to_parent(
         tables: &Translation,
@@ -101,7 +102,7 @@ for_width! {
     ) = to_parent_as
 }
 
-for_width! {
+on_path! {
     /// Adds the local expansion of a cell to those of its two halves.
     pub(crate) fn to_children(
         tables: &Translation,
@@ -113,7 +114,7 @@ for_width! {
     ) = to_children_as
 }
 
-for_width! {
+on_path! {
     /// Adds what the multipoles of the cells listed bring to a local expansion, each up to its order.
     ///
     /// `places` and `multipoles` hold all cells, one expansion after the other.
@@ -129,7 +130,7 @@ for_width! {
 }
 
 #[inline(always)]
-fn to_parent_as<V: Lanes>(
+fn to_parent_as<L: Lanes>(
     tables: &Translation,
     work: &mut Work,
     parent: &Place,
@@ -139,34 +140,34 @@ fn to_parent_as<V: Lanes>(
 ) {
     let order = tables.order;
     let offsets = children.map(|child| child.from(parent));
-    work.face::<V>(order, &offsets);
-    work.load::<V>(order, multipoles, children.map(|child| child.scale / parent.scale), &offsets);
-    work.onto_axis::<V>(tables, order);
+    work.face::<L>(order, &offsets);
+    work.load::<L>(order, multipoles, children.map(|child| child.scale / parent.scale), &offsets);
+    work.onto_axis::<L>(tables, order);
     let steps = work.distances.map(|r| r / parent.scale);
-    powers::<V>(&mut work.powers[..=order], steps);
+    powers::<L>(&mut work.powers[..=order], steps);
     let mut rows = tables.shift.as_slice();
     for m in 0..=order {
         work.gather(order, m);
         for n in m..=order {
             let (row, rest) = rows.split_at(n - m + 1);
             rows = rest;
-            let (mut u, mut v) = (V::zero(), V::zero());
+            let (mut u, mut v) = (Octet::<L>::zero(), Octet::<L>::zero());
             for (([a, b], factor), step) in work.column[m..].iter().zip(row).zip(work.powers[..=n - m].iter().rev()) {
-                let factor = V::load(step).times(V::splat(*factor));
-                (u, v) = (V::load(a).fma(factor, u), V::load(b).fma(factor, v));
+                let factor = Octet::<L>::load(step).times(Octet::<L>::splat(*factor));
+                (u, v) = (Octet::<L>::load(a).fma(factor, u), Octet::<L>::load(b).fma(factor, v));
             }
             work.put(n, m, u, v);
         }
     }
-    work.off_axis::<V>(tables, order);
+    work.off_axis::<L>(tables, order);
     for (out, sum) in out.iter_mut().zip(&work.values[..tables.count()]) {
         *out = Four::ZERO;
-        V::load(sum).add_halves(out);
+        Octet::<L>::load(sum).add_halves(out);
     }
 }
 
 #[inline(always)]
-fn to_children_as<V: Lanes>(
+fn to_children_as<L: Lanes>(
     tables: &Translation,
     work: &mut Work,
     parent: &Place,
@@ -177,40 +178,40 @@ fn to_children_as<V: Lanes>(
     let order = tables.order;
     let offsets = children.map(|child| child.from(parent));
     let back = offsets.map(|offset| offset.map(|c| -c));
-    work.face::<V>(order, &offsets);
-    work.load::<V>(order, [local, local], [1.0; 2], &back);
-    work.onto_axis::<V>(tables, order);
+    work.face::<L>(order, &offsets);
+    work.load::<L>(order, [local, local], [1.0; 2], &back);
+    work.onto_axis::<L>(tables, order);
     let steps = work.distances.map(|r| r / parent.scale);
-    powers::<V>(&mut work.powers[..=order], steps);
+    powers::<L>(&mut work.powers[..=order], steps);
     let mut rows = tables.shift.as_slice();
     for m in 0..=order {
         work.gather(order, m);
         for k in m..=order {
-            work.put(k, m, V::zero(), V::zero());
+            work.put(k, m, Octet::<L>::zero(), Octet::<L>::zero());
         }
         for n in m..=order {
             let (row, rest) = rows.split_at(n - m + 1);
             rows = rest;
-            let [u, v] = [V::load(&work.column[n][0]), V::load(&work.column[n][1])];
+            let [u, v] = [Octet::<L>::load(&work.column[n][0]), Octet::<L>::load(&work.column[n][1])];
             for (k, factor) in (m..=n).zip(row) {
-                let factor = V::load(&work.powers[n - k]).times(V::splat(*factor));
+                let factor = Octet::<L>::load(&work.powers[n - k]).times(Octet::<L>::splat(*factor));
                 work.add(k, m, u.times(factor), v.times(factor));
             }
         }
     }
-    work.off_axis::<V>(tables, order);
+    work.off_axis::<L>(tables, order);
     let shrink = children.map(|child| child.scale / parent.scale);
-    powers::<V>(&mut work.powers[..=order], shrink);
+    powers::<L>(&mut work.powers[..=order], shrink);
     for n in 0..=order {
-        let shrink = V::load(&work.powers[n]);
+        let shrink = Octet::<L>::load(&work.powers[n]);
         for c in n * n..(n + 1) * (n + 1) {
-            V::load(&work.values[c]).times(shrink).add_each(&mut left[c], &mut right[c]);
+            Octet::<L>::load(&work.values[c]).times(shrink).add_each(&mut left[c], &mut right[c]);
         }
     }
 }
 
 #[inline(always)]
-fn to_local_as<V: Lanes>(
+fn to_local_as<L: Lanes>(
     tables: &Translation,
     work: &mut Work,
     target: &Place,
@@ -230,29 +231,29 @@ fn to_local_as<V: Lanes>(
         let given = both.map(|source| &places[source]);
         let offsets = given.map(|place| target.from(place));
         let back = offsets.map(|offset| offset.map(|c| -c));
-        work.face::<V>(order, &offsets);
+        work.face::<L>(order, &offsets);
         let inverse = work.distances.map(|r| 1.0 / r);
         let ratios = std::array::from_fn(|k| given[k].scale * inverse[k]);
-        work.load::<V>(order, both.map(|source| &multipoles[source * count..(source + 1) * count]), ratios, &back);
-        work.onto_axis::<V>(tables, order);
+        work.load::<L>(order, both.map(|source| &multipoles[source * count..(source + 1) * count]), ratios, &back);
+        work.onto_axis::<L>(tables, order);
         let mut columns = tables.columns[order].each_ref().map(Vec::as_slice);
         let mut blocks = tables.far[order].as_slice();
         for m in 0..=order {
             let size = order + 1 - m;
             let (block, rest) = blocks.split_at(size * size);
             blocks = rest;
-            work.multiply::<V>(block, &mut columns[0], size);
+            work.multiply::<L>(block, &mut columns[0], size);
             if m > 0 {
-                work.multiply::<V>(block, &mut columns[1], size);
+                work.multiply::<L>(block, &mut columns[1], size);
             }
         }
-        work.off_axis::<V>(tables, order);
-        powers::<V>(&mut work.powers[..=order], inverse.map(|inverse| target.scale * inverse));
-        let weight = V::load(&Eight::halves(weights[0] * inverse[0], weights[1] * inverse[1]));
+        work.off_axis::<L>(tables, order);
+        powers::<L>(&mut work.powers[..=order], inverse.map(|inverse| target.scale * inverse));
+        let weight = Octet::<L>::load(&Eight::halves(weights[0] * inverse[0], weights[1] * inverse[1]));
         for n in 0..=order {
-            let scale = V::load(&work.powers[n]).times(weight);
+            let scale = Octet::<L>::load(&work.powers[n]).times(weight);
             for c in n * n..(n + 1) * (n + 1) {
-                V::load(&work.values[c]).times(scale).add_halves(&mut out[c]);
+                Octet::<L>::load(&work.values[c]).times(scale).add_halves(&mut out[c]);
             }
         }
     }
@@ -289,7 +290,7 @@ impl Work {
 
     /// Finds the turns that bring each offset onto z.
     #[inline(always)]
-    fn face<V: Lanes>(&mut self, order: usize, offsets: &[[f64; 3]; 2]) {
+    fn face<L: Lanes>(&mut self, order: usize, offsets: &[[f64; 3]; 2]) {
         let angles = offsets.map(|[x, y, z]| {
             let across = (x * x + y * y).sqrt();
             let distance = (x * x + y * y + z * z).sqrt();
@@ -298,7 +299,7 @@ impl Work {
             let (c2, s2) = if distance > 0.0 { (z / distance, -across / distance) } else { (1.0, 0.0) };
             [distance, c1, s1, c2, s2]
         });
-        let lanes = |k: usize| V::load(&Eight::halves(angles[0][k], angles[1][k]));
+        let lanes = |k: usize| Octet::<L>::load(&Eight::halves(angles[0][k], angles[1][k]));
         self.distances = angles.map(|angle| angle[0]);
         multiples(order, lanes(1), lanes(2), &mut self.first);
         multiples(order, lanes(3), lanes(4), &mut self.second);
@@ -307,15 +308,18 @@ impl Work {
     /// Takes two expansions, multiplies degree n by `ratio^n`, and refers the fourth potential to another centre `c'`:
     /// `(y - c') . f = (y - c) . f + back . f` with `back = c - c'`.
     #[inline(always)]
-    fn load<V: Lanes>(&mut self, order: usize, [a, b]: [&[Four]; 2], ratios: [f64; 2], [p, q]: &[[f64; 3]; 2]) {
-        powers::<V>(&mut self.powers[..=order], ratios);
-        let [x, y, z] = std::array::from_fn(|k| V::load(&Eight([0.0, 0.0, 0.0, p[k], 0.0, 0.0, 0.0, q[k]])));
+    fn load<L: Lanes>(&mut self, order: usize, [a, b]: [&[Four]; 2], ratios: [f64; 2], [p, q]: &[[f64; 3]; 2]) {
+        powers::<L>(&mut self.powers[..=order], ratios);
+        let first = p.map(|c| Octet::<L>::load(&Eight([0.0, 0.0, 0.0, c, 0.0, 0.0, 0.0, 0.0])));
+        let second = q.map(|c| Octet::<L>::load(&Eight([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, c])));
         for n in 0..=order {
-            let (ratio, degree) = (V::load(&self.powers[n]), n * n..(n + 1) * (n + 1));
+            let (ratio, degree) = (Octet::<L>::load(&self.powers[n]), n * n..(n + 1) * (n + 1));
             let given = a[degree.clone()].iter().zip(&b[degree.clone()]);
             for ((a, b), value) in given.zip(&mut self.values[degree]) {
-                let four = V::join(a, b);
-                let moved = four.spread::<0>().fma(x, four.spread::<1>().fma(y, four.spread::<2>().fma(z, four)));
+                let mut moved = Octet::<L>::load(&Eight::join(a, b));
+                for k in 0..3 {
+                    moved = second[k].fma_scalar(b.0[k], first[k].fma_scalar(a.0[k], moved));
+                }
                 moved.times(ratio).store(value);
             }
         }
@@ -323,34 +327,34 @@ impl Work {
 
     /// From the axes of space to those of the translation.
     #[inline(always)]
-    fn onto_axis<V: Lanes>(&mut self, tables: &Translation, order: usize) {
-        turn::<V, false>(order, &self.first, &mut self.values);
-        tables.swap.apply::<V>(order, &self.values, &mut self.other);
-        turn::<V, false>(order, &self.second, &mut self.other);
-        tables.swap.apply::<V>(order, &self.other, &mut self.values);
+    fn onto_axis<L: Lanes>(&mut self, tables: &Translation, order: usize) {
+        turn::<L, false>(order, &self.first, &mut self.values);
+        tables.swap.apply::<L>(order, &self.values, &mut self.other);
+        turn::<L, false>(order, &self.second, &mut self.other);
+        tables.swap.apply::<L>(order, &self.other, &mut self.values);
     }
 
     /// Back from the axes of the translation.
     #[inline(always)]
-    fn off_axis<V: Lanes>(&mut self, tables: &Translation, order: usize) {
-        tables.swap.apply::<V>(order, &self.values, &mut self.other);
-        turn::<V, true>(order, &self.second, &mut self.other);
-        tables.swap.apply::<V>(order, &self.other, &mut self.values);
-        turn::<V, true>(order, &self.first, &mut self.values);
+    fn off_axis<L: Lanes>(&mut self, tables: &Translation, order: usize) {
+        tables.swap.apply::<L>(order, &self.values, &mut self.other);
+        turn::<L, true>(order, &self.second, &mut self.other);
+        tables.swap.apply::<L>(order, &self.other, &mut self.values);
+        turn::<L, true>(order, &self.first, &mut self.values);
     }
 
     /// Multiplies the coefficients at the first `size` places by a matrix, and drops these places.
     #[inline(always)]
-    fn multiply<V: Lanes>(&mut self, matrix: &[f64], places: &mut &[u16], size: usize) {
+    fn multiply<L: Lanes>(&mut self, matrix: &[f64], places: &mut &[u16], size: usize) {
         let (own, rest) = places.split_at(size);
         *places = rest;
         let (taken, made) = (&mut self.taken[..size], &mut self.made[..size]);
         for (taken, &place) in taken.iter_mut().zip(own) {
-            V::load(&self.values[place as usize]).store(taken);
+            Octet::<L>::load(&self.values[place as usize]).store(taken);
         }
-        square::multiply::<V>(matrix, taken, made);
+        square::multiply::<L>(matrix, taken, made);
         for (made, &place) in made.iter().zip(own) {
-            V::load(made).store(&mut self.values[place as usize]);
+            Octet::<L>::load(made).store(&mut self.values[place as usize]);
         }
     }
 
@@ -366,7 +370,7 @@ impl Work {
     }
 
     #[inline(always)]
-    fn put<V: Lanes>(&mut self, n: usize, m: usize, u: V, v: V) {
+    fn put<L: Lanes>(&mut self, n: usize, m: usize, u: Octet<L>, v: Octet<L>) {
         u.store(&mut self.values[real(n, m)]);
         if m > 0 {
             v.store(&mut self.values[imaginary(n, m)]);
@@ -374,21 +378,21 @@ impl Work {
     }
 
     #[inline(always)]
-    fn add<V: Lanes>(&mut self, n: usize, m: usize, u: V, v: V) {
+    fn add<L: Lanes>(&mut self, n: usize, m: usize, u: Octet<L>, v: Octet<L>) {
         let place = &mut self.values[real(n, m)];
-        V::load(place).plus(u).store(place);
+        Octet::<L>::load(place).plus(u).store(place);
         if m > 0 {
             let place = &mut self.values[imaginary(n, m)];
-            V::load(place).plus(v).store(place);
+            Octet::<L>::load(place).plus(v).store(place);
         }
     }
 }
 
 /// Powers of two ratios, from the zeroth on.
 #[inline(always)]
-fn powers<V: Lanes>(out: &mut [Eight], ratios: [f64; 2]) {
-    let ratio = V::load(&Eight::halves(ratios[0], ratios[1]));
-    let mut power = V::splat(1.0);
+fn powers<L: Lanes>(out: &mut [Eight], ratios: [f64; 2]) {
+    let ratio = Octet::<L>::load(&Eight::halves(ratios[0], ratios[1]));
+    let mut power = Octet::<L>::splat(1.0);
     for out in out {
         power.store(out);
         power = power.times(ratio);
