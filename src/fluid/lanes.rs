@@ -45,10 +45,10 @@ pub(crate) trait Lanes:
     fn per_vector<T: Copy>(value: T) -> Self::PerVector<T>;
 
     /// Eight numbers, in as many vectors as they take.
-    type Octet: Copy + AsRef<[Self]>;
+    type Octet: Copy + AsRef<[Self]> + AsMut<[Self]>;
 
-    /// The vectors of eight numbers, made one by one from their places.
-    fn octet(make: impl FnMut(usize) -> Self) -> Self::Octet;
+    /// The same vector as often as eight numbers take it.
+    fn octet(vector: Self) -> Self::Octet;
 
     /// The same value in every lane.
     fn splat(value: f64) -> Self;

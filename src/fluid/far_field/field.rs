@@ -44,10 +44,11 @@ fn evaluate_as<L: Lanes>(
                 from[k].0[lane] = target[k] - place.centre[k];
             }
         }
-        harmonics.evaluate(
-            std::array::from_fn(|k| Octet::<L>::load(&from[k]).times(Octet::<L>::splat(inverse))),
-            &mut values,
-        );
+        let mut scaled = Octet::<L>::load_each(&from);
+        for coordinate in &mut scaled {
+            *coordinate = coordinate.times(Octet::splat(inverse));
+        }
+        harmonics.evaluate(scaled, &mut values);
         let mut sums = [[Octet::<L>::zero(); 2]; 8];
         for (value, [first, second]) in values[..local.len()].iter().zip(&fields) {
             let (first, second) = (Octet::<L>::load(first), Octet::<L>::load(second));

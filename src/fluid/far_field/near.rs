@@ -33,7 +33,8 @@ fn add_near_as<L: Lanes>(sources: &[Source], runs: &[Range<u32>], targets: &[[f6
         for run in runs {
             for source in &sources[run.start as usize..run.end as usize] {
                 let Pair { x, y, z, inverse, cube } = Pair::new(at, source);
-                let [p, q, r] = source.force.map(Octet::<L>::splat);
+                let [p, q, r] = source.force;
+                let (p, q, r) = (Octet::splat(p), Octet::splat(q), Octet::splat(r));
                 let along = x.fma(p, y.fma(q, z.times(r))).times(cube);
                 let even = cube.fma_scalar(source.epsilon_squared, inverse);
                 u = even.fma(p, x.fma(along, u));
@@ -82,7 +83,10 @@ struct Pair<L: Lanes> {
 impl<L: Lanes> Pair<L> {
     #[inline(always)]
     fn new(at: [Octet<L>; 3], source: &Source) -> Self {
-        let [x, y, z]: [Octet<L>; 3] = std::array::from_fn(|k| at[k].minus(Octet::<L>::splat(source.position[k])));
+        let [a, b, c] = source.position;
+        let x = at[0].minus(Octet::splat(a));
+        let y = at[1].minus(Octet::splat(b));
+        let z = at[2].minus(Octet::splat(c));
         let r_squared = x.fma(x, y.fma(y, z.fma(z, Octet::<L>::splat(source.epsilon_squared))));
         let inverse = r_squared.inverse_root();
         Self { x, y, z, inverse, cube: inverse.times(inverse).times(inverse) }
@@ -92,11 +96,13 @@ impl<L: Lanes> Pair<L> {
 /// Up to eight points by coordinates; lanes without one repeat the first.
 #[inline(always)]
 fn columns<L: Lanes>(points: &[[f64; 3]]) -> [Octet<L>; 3] {
-    std::array::from_fn(|k| {
+    let mut columns = [Octet::zero(); 3];
+    for k in 0..3 {
         let mut column = Eight([points[0][k]; 8]);
         for (value, point) in column.0.iter_mut().zip(points) {
             *value = point[k];
         }
-        Octet::<L>::load(&column)
-    })
+        columns[k] = Octet::load(&column);
+    }
+    columns
 }

@@ -37,25 +37,11 @@ impl Eight {
 #[derive(Clone, Copy)]
 pub(crate) struct Octet<L: Lanes>(L::Octet);
 
+// Loops and no closures: code in a closure is not compiled for the instructions of its path.
 impl<L: Lanes> Octet<L> {
     #[inline(always)]
-    fn map(self, make: impl Fn(L) -> L) -> Self {
-        Self(L::octet(|k| make(self.0.as_ref()[k])))
-    }
-
-    #[inline(always)]
-    fn zip(self, other: Self, make: impl Fn(L, L) -> L) -> Self {
-        Self(L::octet(|k| make(self.0.as_ref()[k], other.0.as_ref()[k])))
-    }
-
-    #[inline(always)]
-    fn zip_three(self, a: Self, b: Self, make: impl Fn(L, L, L) -> L) -> Self {
-        Self(L::octet(|k| make(self.0.as_ref()[k], a.0.as_ref()[k], b.0.as_ref()[k])))
-    }
-
-    #[inline(always)]
     pub fn splat(value: f64) -> Self {
-        Self(L::octet(|_| L::splat(value)))
+        Self(L::octet(L::splat(value)))
     }
 
     #[inline(always)]
@@ -65,53 +51,84 @@ impl<L: Lanes> Octet<L> {
 
     #[inline(always)]
     pub fn load(Eight(from): &Eight) -> Self {
-        Self(L::octet(|k| L::load(&from[k * L::WIDTH..(k + 1) * L::WIDTH])))
+        let mut loaded = Self::zero();
+        for (vector, from) in loaded.0.as_mut().iter_mut().zip(from.chunks_exact(L::WIDTH)) {
+            *vector = L::load(from);
+        }
+        loaded
+    }
+
+    #[inline(always)]
+    pub fn load_each<const N: usize>(from: &[Eight; N]) -> [Self; N] {
+        let mut loaded = [Self::zero(); N];
+        for (octet, from) in loaded.iter_mut().zip(from) {
+            *octet = Self::load(from);
+        }
+        loaded
     }
 
     #[inline(always)]
     pub fn store(self, Eight(to): &mut Eight) {
-        for (k, vector) in self.0.as_ref().iter().enumerate() {
-            vector.store(&mut to[k * L::WIDTH..(k + 1) * L::WIDTH]);
+        for (vector, to) in self.0.as_ref().iter().zip(to.chunks_exact_mut(L::WIDTH)) {
+            vector.store(to);
         }
     }
 
     #[inline(always)]
-    pub fn plus(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
+    pub fn plus(mut self, other: Self) -> Self {
+        for (own, &other) in self.0.as_mut().iter_mut().zip(other.0.as_ref()) {
+            *own = *own + other;
+        }
+        self
     }
 
     #[inline(always)]
-    pub fn minus(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
+    pub fn minus(mut self, other: Self) -> Self {
+        for (own, &other) in self.0.as_mut().iter_mut().zip(other.0.as_ref()) {
+            *own = *own - other;
+        }
+        self
     }
 
     #[inline(always)]
-    pub fn times(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
+    pub fn times(mut self, other: Self) -> Self {
+        for (own, &other) in self.0.as_mut().iter_mut().zip(other.0.as_ref()) {
+            *own = *own * other;
+        }
+        self
     }
 
     /// `self * a + b`.
     #[inline(always)]
-    pub fn fma(self, a: Self, b: Self) -> Self {
-        self.zip_three(a, b, |this, a, b| this.mul_add(a, b))
+    pub fn fma(mut self, a: Self, b: Self) -> Self {
+        for ((own, &a), &b) in self.0.as_mut().iter_mut().zip(a.0.as_ref()).zip(b.0.as_ref()) {
+            *own = own.mul_add(a, b);
+        }
+        self
     }
 
     /// `b - self * a`.
     #[inline(always)]
-    pub fn fnma(self, a: Self, b: Self) -> Self {
-        self.zip_three(a, b, |this, a, b| this.neg_mul_add(a, b))
+    pub fn fnma(mut self, a: Self, b: Self) -> Self {
+        for ((own, &a), &b) in self.0.as_mut().iter_mut().zip(a.0.as_ref()).zip(b.0.as_ref()) {
+            *own = own.neg_mul_add(a, b);
+        }
+        self
+    }
+
+    /// `1 / sqrt(self)`.
+    #[inline(always)]
+    pub fn inverse_root(mut self) -> Self {
+        for own in self.0.as_mut() {
+            *own = inverse_sqrt(*own);
+        }
+        self
     }
 
     /// `self * a + b` with one number for all of `a`.
     #[inline(always)]
     pub fn fma_scalar(self, a: f64, b: Self) -> Self {
         self.fma(Self::splat(a), b)
-    }
-
-    /// `1 / sqrt(self)`.
-    #[inline(always)]
-    pub fn inverse_root(self) -> Self {
-        self.map(inverse_sqrt)
     }
 
     /// Adds the sum of the halves to `to`.

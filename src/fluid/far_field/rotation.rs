@@ -107,14 +107,12 @@ pub(crate) const NO_MULTIPLES: Multiples = [[[Eight::ZERO; 2]; MAX_ORDER / 2 + 1
 #[inline(always)]
 pub(crate) fn multiples<L: Lanes>(order: usize, cosine: Octet<L>, sine: Octet<L>, [even, odd]: &mut Multiples) {
     let (mut c, mut s) = (Octet::<L>::splat(1.0), Octet::<L>::zero());
-    let mut next = |out: &mut [Eight; 2]| {
-        c.store(&mut out[0]);
-        s.store(&mut out[1]);
-        (c, s) = (s.fnma(sine, c.times(cosine)), c.fma(sine, s.times(cosine)));
-    };
     for (even, odd) in even.iter_mut().zip(odd).take(order / 2 + 1) {
-        next(even);
-        next(odd);
+        for out in [even, odd] {
+            c.store(&mut out[0]);
+            s.store(&mut out[1]);
+            (c, s) = (s.fnma(sine, c.times(cosine)), c.fma(sine, s.times(cosine)));
+        }
     }
 }
 

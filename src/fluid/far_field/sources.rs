@@ -75,8 +75,8 @@ fn multipole_as<L: Lanes>(harmonics: &Harmonics, place: &Place, sources: &[Sourc
             let chi = from[0] * q[0] + from[1] * q[1] + from[2] * q[2];
             charges[lane] = Eight([q[0], q[1], q[2], chi, half * q[0], half * q[1], half * q[2], 0.0]);
         }
-        harmonics.evaluate(std::array::from_fn(|k| Octet::<L>::load(&point[k])), &mut values);
-        let charges = charges.map(|charge| Octet::<L>::load(&charge));
+        harmonics.evaluate(Octet::<L>::load_each(&point), &mut values);
+        let charges = Octet::<L>::load_each(&charges);
         for (moment, value) in moments[..count].iter_mut().zip(&values) {
             // Two sums, so that neither waits long for itself.
             let (mut even, mut odd) = (Octet::<L>::load(moment), Octet::<L>::zero());

@@ -30,7 +30,7 @@ pub(crate) fn multiply<L: Lanes>(matrix: &[f64], values: &[Eight], out: &mut [Ei
 fn unrolled<L: Lanes, const SIZE: usize>(matrix: &[f64], values: &[Eight], out: &mut [Eight]) {
     let (rows, _) = matrix.as_chunks::<SIZE>();
     let Some(values) = values.first_chunk::<SIZE>() else { return };
-    let values: [Octet<L>; SIZE] = std::array::from_fn(|k| Octet::<L>::load(&values[k]));
+    let values = Octet::<L>::load_each(values);
     for (row, out) in rows.iter().zip(out) {
         let mut sum = values[0].times(Octet::<L>::splat(row[0]));
         for k in 1..SIZE {

@@ -299,10 +299,11 @@ impl Work {
             let (c2, s2) = if distance > 0.0 { (z / distance, -across / distance) } else { (1.0, 0.0) };
             [distance, c1, s1, c2, s2]
         });
-        let lanes = |k: usize| Octet::<L>::load(&Eight::halves(angles[0][k], angles[1][k]));
+        let halves = |k: usize| Eight::halves(angles[0][k], angles[1][k]);
+        let [c1, s1, c2, s2] = Octet::<L>::load_each(&[halves(1), halves(2), halves(3), halves(4)]);
         self.distances = angles.map(|angle| angle[0]);
-        multiples(order, lanes(1), lanes(2), &mut self.first);
-        multiples(order, lanes(3), lanes(4), &mut self.second);
+        multiples(order, c1, s1, &mut self.first);
+        multiples(order, c2, s2, &mut self.second);
     }
 
     /// Takes two expansions, multiplies degree n by `ratio^n`, and refers the fourth potential to another centre `c'`:
@@ -310,8 +311,8 @@ impl Work {
     #[inline(always)]
     fn load<L: Lanes>(&mut self, order: usize, [a, b]: [&[Four]; 2], ratios: [f64; 2], [p, q]: &[[f64; 3]; 2]) {
         powers::<L>(&mut self.powers[..=order], ratios);
-        let first = p.map(|c| Octet::<L>::load(&Eight([0.0, 0.0, 0.0, c, 0.0, 0.0, 0.0, 0.0])));
-        let second = q.map(|c| Octet::<L>::load(&Eight([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, c])));
+        let first = Octet::<L>::load_each(&p.map(|c| Eight([0.0, 0.0, 0.0, c, 0.0, 0.0, 0.0, 0.0])));
+        let second = Octet::<L>::load_each(&q.map(|c| Eight([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, c])));
         for n in 0..=order {
             let (ratio, degree) = (Octet::<L>::load(&self.powers[n]), n * n..(n + 1) * (n + 1));
             let given = a[degree.clone()].iter().zip(&b[degree.clone()]);

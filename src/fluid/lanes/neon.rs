@@ -58,8 +58,8 @@ impl Lanes for Neon {
     }
 
     #[inline(always)]
-    fn octet(make: impl FnMut(usize) -> Self) -> Self::Octet {
-        std::array::from_fn(make)
+    fn octet(vector: Self) -> Self::Octet {
+        [vector; MOST_LANES / Self::WIDTH]
     }
 
     #[inline(always)]

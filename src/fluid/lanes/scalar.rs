@@ -52,8 +52,8 @@ impl<const FUSED: bool> Lanes for Scalar<FUSED> {
     }
 
     #[inline(always)]
-    fn octet(make: impl FnMut(usize) -> Self) -> Self::Octet {
-        std::array::from_fn(make)
+    fn octet(vector: Self) -> Self::Octet {
+        [vector; MOST_LANES]
     }
 
     #[inline(always)]

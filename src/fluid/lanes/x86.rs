@@ -108,8 +108,8 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn octet(make: impl FnMut(usize) -> Self) -> Self::Octet {
-        std::array::from_fn(make)
+    fn octet(vector: Self) -> Self::Octet {
+        [vector; MOST_LANES / Self::WIDTH]
     }
 
     #[inline(always)]
@@ -267,8 +267,8 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn octet(make: impl FnMut(usize) -> Self) -> Self::Octet {
-        std::array::from_fn(make)
+    fn octet(vector: Self) -> Self::Octet {
+        [vector; MOST_LANES / Self::WIDTH]
     }
 
     #[inline(always)]
