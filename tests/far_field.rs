@@ -218,8 +218,8 @@ fn tiny_scenes_are_summed_to_the_tolerance() {
 fn scenes_without_edges_or_targets_have_no_flow() {
     let scene = Scene { nodes: vec![Vec3::zeros(); 3], edges: vec![], epsilon: vec![] };
     assert_eq!(scene.product(None, 1e-4, &[1.0; 9]), [0.0; 9]);
-    assert_eq!(Scene::rod(100).product(Some(&[]), 1e-4, &[1.0; 300]), []);
-    assert_eq!(Scene::empty().product(None, 1e-4, &[]), []);
+    assert!(Scene::rod(100).product(Some(&[]), 1e-4, &[1.0; 300]).is_empty());
+    assert!(Scene::empty().product(None, 1e-4, &[]).is_empty());
 }
 
 #[test]

@@ -216,9 +216,10 @@ impl Model {
             FluidModelSpecification::ResistiveForce { coefficients } => {
                 Box::new(ResistiveForce::new(edges, &fluid.immersed, coefficients))
             }
-            FluidModelSpecification::StokesletSegments { epsilon } => {
+            FluidModelSpecification::StokesletSegments { epsilon, far_field } => {
                 let local = preconditioner_drag(fluid.viscosity, &self.specification, epsilon);
-                Box::new(StokesletSegments::new(nodes, edges, &fluid.immersed, epsilon, fluid.viscosity, &local)?)
+                let immersed = &fluid.immersed;
+                Box::new(StokesletSegments::new(nodes, edges, immersed, epsilon, fluid.viscosity, &local, far_field)?)
             }
         }))
     }

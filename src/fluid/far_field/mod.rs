@@ -274,6 +274,11 @@ impl FarField {
         Ok(())
     }
 
+    /// Number of targets, M.
+    pub fn target_count(&self) -> usize {
+        self.targets.len()
+    }
+
     /// What the product consists of at the present positions.
     pub fn summary(&self) -> Summary {
         let near = |leaf: &Leaf| leaf.targets.len() * leaf.runs.iter().map(ExactSizeIterator::len).sum::<usize>();
