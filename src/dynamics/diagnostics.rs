@@ -6,8 +6,13 @@ use super::simulation::Simulation;
 use crate::Vec3;
 use crate::elastic::motors::Drive;
 use crate::fluid::FluidModel;
+use crate::fluid::product::FarFieldChoice;
 use crate::linear::LinearError;
 use crate::rod::configuration::node;
+
+/// Nodes up to which a resistance matrix is formed although steps do without the mobility's: with it, its factors and
+/// the mobility 3.5 GB.
+const MOST_RESISTANCES: usize = 4000;
 
 impl Simulation {
     /// Energies of stretching, bending and twisting, J.
@@ -79,20 +84,29 @@ impl Simulation {
     /// Resistance of the nodes (3N x 3N, column-major), N s/m: the force that moves them through the fluid at given velocities.
     ///
     /// # Errors
-    /// If the fluid's matrix is singular, or the scene so large that it has none.
+    /// If the fluid's matrix is singular, or [`LinearError::MatrixFree`] if the scene has more than 4000 nodes and
+    /// the far-field crossover lies below.
     pub fn resistance(&mut self) -> Result<Vec<f64>, LinearError> {
         let nodes = self.model.network.node_count();
+        let positions = self.state.positions(&self.model.network);
         let mobility = self.balance.fluid_mut().and_then(FluidModel::nonlocal);
-        if mobility.is_some_and(|mobility| mobility.is_matrix_free()) {
-            let gigabytes = 72e-9 * (nodes * nodes) as f64;
-            return Err(LinearError::MatrixFree { what: "resistance", nodes, gigabytes });
+        let mut stored = match mobility.is_some_and(|mobility| mobility.is_matrix_free()) {
+            true if nodes > MOST_RESISTANCES => {
+                let gigabytes = 72e-9 * (nodes * nodes) as f64;
+                return Err(LinearError::MatrixFree { what: "resistance", nodes, gigabytes });
+            }
+            true => self.model.fluid_with(Some(&FarFieldChoice::NEVER))?,
+            false => None,
+        };
+        if let Some(fluid) = &mut stored {
+            fluid.update(&positions, self.balance.pool.as_deref())?;
+        } else {
+            let mut ignored = super::statistics::Statistics::default();
+            self.balance.place_fluid(&positions, &mut ignored)?;
+            self.forget_fluid();
         }
         let mut out = vec![0.0; 9 * nodes * nodes];
-        let positions = self.state.positions(&self.model.network);
-        let mut ignored = super::statistics::Statistics::default();
-        self.balance.place_fluid(&positions, &mut ignored)?;
-        self.forget_fluid();
-        let Some(fluid) = self.balance.fluid_mut() else {
+        let Some(fluid) = stored.as_deref_mut().or_else(|| self.balance.fluid_mut()) else {
             return Ok(out);
         };
         let immersed = fluid.immersed().to_vec();

@@ -34,7 +34,10 @@ impl Default for FarFieldChoice {
 
 impl FarFieldChoice {
     /// Immersed nodes from which on a step takes less time without the matrix (docs/performance.md).
-    pub const CROSSOVER: usize = 1000;
+    pub const CROSSOVER: usize = 500;
+
+    /// The matrix, whatever its size.
+    pub const NEVER: Self = Self { from: usize::MAX, error: 1e-6 };
 }
 
 /// The product with the mobility at a geometry.

@@ -16,7 +16,7 @@ from flagrs.scene.values import Array, Bounds, Flag, FloatArray, index, number, 
 EPSILON_RATIO = {"slender": math.sqrt(math.e), "seed": 1.031}
 
 #: Immersed nodes from which on a step takes less time without the matrix of the segments (docs/performance.md).
-CROSSOVER = 1000
+CROSSOVER = 500
 
 _length = Array(((),), Bounds("m", above=0.0))
 
@@ -59,7 +59,7 @@ class Fluid(Part):
         the product, where it is made by the fast multipole method: 1e-9 to 0.1.
     far_field_nodes : int or None
         Immersed nodes from which on the method is used and the dense matrix of the segments is never formed;
-        0: always. None: 1000, where a step takes the same time either way.
+        0: always. None: 500, where a step takes the same time either way.
     density : float
         Density of the fluid [kg/m^3], for buoyancy under gravity.
     """

@@ -42,8 +42,8 @@ impl Accuracy {
             _ => 4,
         };
         // Cells in which summing one by one costs as much as the expansions (at 1e-4, leaves of
-        // 32 to 64 take the same time within a tenth for scattered flagella; other orders are scaled from there).
-        let leaf = 16.0 + 0.3 * order * order;
+        // 24 to 48 take the same time within a tenth for scattered flagella; other orders are scaled from there).
+        let leaf = 16.0 + 0.12 * order * order;
         Self {
             order: (order as usize).clamp(2, MAX_ORDER),
             truncation,
@@ -73,10 +73,10 @@ impl Accuracy {
 
     /// Pairs of a target and a Gauss point that cost as much as a pair of cells with expansions of this order.
     ///
-    /// With AVX-512 about 0.7 ns for the former and 0.25 us + 1 ns (order + 1)^3 for the latter, estimated from
+    /// With AVX-512 about 1.1 ns for the former and 0.4 us + 0.5 ns (order + 1)^3 for the latter, estimated from
     /// the times of whole products at several orders and cell sizes.
     pub fn worthwhile(&self, order: usize) -> usize {
-        350 + 7 * (order + 1).pow(3) / 5
+        350 + 9 * (order + 1).pow(3) / 20
     }
 }
 
