@@ -1,9 +1,10 @@
-"""The product of the mobility with a force density without its matrix: time and error from 300 to 100,000 nodes.
+"""The product of the mobility with a force density without its matrix: its time and error, and whole steps.
 
-Run ``python benches/python/far_field.py [--document docs/performance.md]``. The scenes are helical flagella of 68
-nodes, scattered at one density whatever their number. Errors are the largest at any of 2000 nodes, over the
-largest component of the product, for a random and a uniform force density; times are the shortest of several, of
-one thread. The direct sum is timed on at most 2000 targets beyond 10,000 nodes, and scaled.
+Run ``python benches/python/far_field.py [--document docs/performance.md]``. The scenes are 5 to 1470 helical
+flagella of 68 nodes, scattered at one density whatever their number. Errors are the largest at any of 2000
+nodes, over the largest component of the product, for a random and a uniform force density; times are the
+shortest of several, of one thread. The direct sum is timed on at most 2000 targets beyond 10,000 nodes, and
+scaled.
 """
 
 from __future__ import annotations
@@ -202,11 +203,18 @@ def draw(results: list[Result]) -> None:
     )
     for marker, error in zip("o^v", ERRORS, strict=True):
         (line,) = times.loglog(
-            nodes, [result.product[error] for result in results], marker + "-", label=f"multipoles, {error:.0e}"
+            nodes,
+            [result.product[error] for result in results],
+            marker + "-",
+            label=f"multipoles, {error:.0e}",
         )
-        errors.loglog(nodes, [result.error[error] for result in results], marker + "-", color=line.get_color())
+        errors.loglog(
+            nodes, [result.error[error] for result in results], marker + "-", color=line.get_color()
+        )
         errors.axhline(error, color=line.get_color(), linestyle=":")
-        errors.annotate(f"{error:.0e} asked for", (nodes[0], error), xytext=(0, 3), textcoords="offset points")
+        errors.annotate(
+            f"{error:.0e} asked for", (nodes[0], error), xytext=(0, 3), textcoords="offset points"
+        )
     dress(times, "nodes", "time of a product on one thread [s]", "Time")
     dress(errors, "nodes", "largest error / largest component", "Error found")
     times.legend()

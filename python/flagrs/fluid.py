@@ -166,7 +166,7 @@ class FastMobility:
         return self._native.apply(_vectors("force_density", force_density))
 
     def update(self, nodes: Any, targets: Any = None) -> None:
-        """Move to other positions (N, 3) [m] of the same nodes, and of the targets (M, 3) if there are any."""
+        """Move to other positions (N, 3) [m] of the nodes, and of the targets (M, 3) if there are any."""
         at = None if targets is None else _vectors("targets", targets)
         self._native.update(_vectors("nodes", nodes), at)
 

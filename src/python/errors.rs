@@ -62,7 +62,8 @@ pub fn far_field_error(py: Python<'_>, error: &FarFieldError) -> PyErr {
             (format!("epsilon[{edge}]"), format!("{value:e}"), format!("finite and > {smallest:e} m"))
         }
         FarFieldError::Length { field, actual, expected } => {
-            ((*field).to_owned(), format!("{actual} entries"), format!("{expected} entries"))
+            let field = if *field == "density" { "force_density" } else { field };
+            (field.to_owned(), format!("{actual} entries"), format!("{expected} entries"))
         }
     };
     scene_error(py, &field, &value, &allowed)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from flagrs import Fluid, FlagrsError, Rod, Scene, SceneError, Simulation, scenarios
+from flagrs import FlagrsError, Fluid, Rod, Scene, SceneError, Simulation, scenarios
 from flagrs.fluid import FastMobility, mobility
 
 Array = npt.NDArray[np.float64]
@@ -66,7 +66,9 @@ def test_targets_of_their_own_and_moved_nodes() -> None:
 
 def test_number_of_threads_does_not_change_a_bit() -> None:
     nodes, edges = segments(40)
-    products = [FastMobility(nodes, edges, EPSILON, error=1e-5, threads=n).apply(density(40)) for n in (1, 2, 3)]
+    products = [
+        FastMobility(nodes, edges, EPSILON, error=1e-5, threads=n).apply(density(40)) for n in (1, 2, 3)
+    ]
     assert (products[0] == products[1]).all()
     assert (products[0] == products[2]).all()
     steps = [displacement(20, threads=n, far_field_nodes=0) for n in (1, 2)]

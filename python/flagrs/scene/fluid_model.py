@@ -15,7 +15,7 @@ from flagrs.scene.values import Array, Bounds, Flag, FloatArray, index, number, 
 #: Regularization over rod radius, by name: matching slender-body theory, and the supplementary text's choice.
 EPSILON_RATIO = {"slender": math.sqrt(math.e), "seed": 1.031}
 
-#: Immersed nodes from which on a step takes less time without the matrix of the segments (docs/performance.md).
+#: Immersed nodes from which on a step takes less time without the segments' matrix (docs/performance.md).
 CROSSOVER = 500
 
 _length = Array(((),), Bounds("m", above=0.0))
@@ -55,8 +55,8 @@ class Fluid(Part):
         Wavelength of the filaments for these coefficients [m]: the pitch of a helix for ``gray-hancock``, the
         arc length of a turn for ``lighthill``. None: the immersed length of each rod, for straight ones.
     far_field_error : float
-        Largest error of the product of the mobility with a force density, relative to the largest component of
-        the product, where it is made by the fast multipole method: 1e-9 to 0.1.
+        Largest error of the product of the mobility with a force density, relative to its largest component,
+        where it is made by the fast multipole method: 1e-9 to 0.1.
     far_field_nodes : int or None
         Immersed nodes from which on the method is used and the dense matrix of the segments is never formed;
         0: always. None: 500, where a step takes the same time either way.

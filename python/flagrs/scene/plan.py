@@ -78,7 +78,9 @@ class Plan:
                 f"fluid:    dense {self.fluid_matrix} x {self.fluid_matrix}, {_size(self.fluid_bytes)}"
             )
         elif self.far_field_error is not None:
-            lines.append(f"fluid:    products to {self.far_field_error:g} by fast multipoles, without a matrix")
+            lines.append(
+                f"fluid:    products to {self.far_field_error:g} by fast multipoles, without a matrix"
+            )
         lines.append(f"a step:   about {self.flops / 1e6:.3g} million floating-point operations")
         return "\n".join([*lines, *(f"warning:  {warning}" for warning in self.warnings)])
 
