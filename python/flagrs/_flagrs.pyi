@@ -8,6 +8,7 @@ _Floats = npt.NDArray[np.float64]
 _Ints = npt.NDArray[np.int64]
 
 __all__ = [
+    "FastMobility",
     "Simulation",
     "__version__",
     "hat_weights",
@@ -18,6 +19,22 @@ __all__ = [
 ]
 
 __version__: str
+
+@final
+class FastMobility:
+    def __new__(
+        cls,
+        nodes: _Floats,
+        edges: _Ints,
+        epsilon: _Floats,
+        targets: _Floats | None,
+        error: float,
+        threads: int,
+    ) -> FastMobility: ...
+    def update(self, nodes: _Floats, targets: _Floats | None = None) -> None: ...
+    def apply(self, force_density: _Floats) -> _Floats: ...
+    @property
+    def bytes(self) -> int: ...
 
 @final
 class Simulation:

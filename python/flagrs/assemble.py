@@ -162,6 +162,8 @@ def _fluid(scene: Scene, fluid: Fluid) -> dict[str, Any]:
         "immersed": (immersed & (fluid.model != "none")).tolist(),
         "twist_drag": fluid.twist_drag,
         "density": fluid.density,
+        "far_field_error": fluid.far_field_error,
+        "far_field_nodes": fluid.crossover,
         "epsilon": None if local else fluid.epsilon_array(radius),
         "coefficients": resistive_coefficients(scene, fluid) if local else None,
     }

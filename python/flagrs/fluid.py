@@ -12,7 +12,7 @@ from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
 from flagrs.threads import thread_count
 
-__all__ = ["hat_weights", "mobility", "velocity"]
+__all__ = ["FastMobility", "hat_weights", "mobility", "velocity"]
 
 
 def mobility(
@@ -108,6 +108,72 @@ def velocity(
     mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
     return _flagrs.velocity(at, sources, pairs, density, mu, widths, thread_count(threads))
+
+
+class FastMobility:
+    """The mobility of segments as an operator: its products without its matrix, in time proportional to N.
+
+    ``8 pi mu u = A f`` as in `mobility`, by a fast multipole method that errs by no more than it is told.
+
+    Parameters
+    ----------
+    nodes, edges, epsilon
+        Segments, as in `mobility`.
+    targets
+        Points (M, 3) at which the velocity is taken [m]; None: the nodes.
+    error
+        Largest error of a component of a product, relative to its largest component: 1e-9 to 0.1.
+    threads
+        Threads to use; None: ``FLAGRS_THREADS``, else all. Products are the same to the last bit whatever
+        their number.
+
+    Raises
+    ------
+    SceneError
+        As `mobility`, and for an error out of range.
+
+    Notes
+    -----
+    docs/theory/fluid.md, section 10; time and error are measured in docs/performance.md.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> nodes = np.linspace([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 500)
+    >>> edges = np.stack([np.arange(499), np.arange(1, 500)], axis=1)
+    >>> flow = FastMobility(nodes, edges, epsilon=1e-3, error=1e-6).apply(np.ones((500, 3)))
+    >>> exact = (mobility(nodes, edges, epsilon=1e-3) @ np.ones(1500)).reshape(-1, 3)
+    >>> bool(np.abs(flow - exact).max() <= 1e-6 * np.abs(exact).max())
+    True
+    """
+
+    def __init__(
+        self,
+        nodes: Any,
+        edges: Any,
+        epsilon: Any,
+        targets: Any = None,
+        error: float = 1e-6,
+        threads: int | None = None,
+    ) -> None:
+        points, pairs, widths = _segments(nodes, edges, epsilon)
+        at = None if targets is None else _vectors("targets", targets)
+        largest = number("error", error, Bounds("1", at_least=1e-9, at_most=0.1))
+        self._native = _flagrs.FastMobility(points, pairs, widths, at, largest, thread_count(threads))
+
+    def apply(self, force_density: Any) -> FloatArray:
+        """Return ``8 pi mu u`` (M, 3) [N/m] for the force density (N, 3) [N/m] at the nodes."""
+        return self._native.apply(_vectors("force_density", force_density))
+
+    def update(self, nodes: Any, targets: Any = None) -> None:
+        """Move to other positions (N, 3) [m] of the nodes, and of the targets (M, 3) if there are any."""
+        at = None if targets is None else _vectors("targets", targets)
+        self._native.update(_vectors("nodes", nodes), at)
+
+    @property
+    def bytes(self) -> int:
+        """Memory held by all that grows with the scene [bytes]."""
+        return self._native.bytes
 
 
 def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:

@@ -132,7 +132,7 @@ pub(super) struct Balance {
     pub(super) work: super::solve::Work,
     constant: Vec<f64>,
     contact: Vec<f64>,
-    pool: Option<Arc<ThreadPool>>,
+    pub(super) pool: Option<Arc<ThreadPool>>,
 }
 
 impl Balance {
@@ -236,7 +236,7 @@ impl Balance {
         self.constant.fill(0.0);
         if let Some(fluid) = self.fluid.as_mut().filter(|_| !step.scheme.fluid_is_implicit()) {
             gather(&self.fluid_dofs, |dof| step.state.velocity[dof], &mut self.flow);
-            fluid.resist(&mut self.flow)?;
+            fluid.resist(&mut self.flow, self.pool.as_deref())?;
             scatter(&self.fluid_dofs, &self.flow, &mut self.constant);
         }
         statistics.seconds_fluid += start.elapsed().as_secs_f64();
@@ -342,12 +342,12 @@ impl Balance {
 
     fn add_fluid(&mut self, step: &Step, trial: &Unknowns) -> Option<()> {
         let Some(fluid) = self.fluid.as_mut().filter(|_| step.scheme.fluid_is_implicit()) else { return Some(()) };
-        let increment = step.increment();
+        let (increment, pool) = (step.increment(), self.pool.as_deref());
         gather(&self.fluid_dofs, |dof| increment.rate_of(dof, trial.q[dof]), &mut self.flow);
         match fluid.nonlocal() {
-            None => fluid.resist(&mut self.flow).ok()?,
+            None => fluid.resist(&mut self.flow, pool).ok()?,
             Some(mobility) => {
-                mobility.apply(&trial.density, &mut self.slip);
+                mobility.apply(&trial.density, &mut self.slip, pool).ok()?;
                 let scale = mobility.scale();
                 self.slip.iter_mut().zip(&self.flow).for_each(|(slip, velocity)| *slip -= scale * velocity);
                 mobility.weigh(&trial.density, &mut self.flow);

@@ -1,11 +1,19 @@
 //! What a state tells: energies, motor torques, force densities, gaps, the balance of forces and torques.
 
+use rayon::ThreadPool;
+
 use super::contact_model::ContactModel;
 use super::simulation::Simulation;
 use crate::Vec3;
 use crate::elastic::motors::Drive;
+use crate::fluid::FluidModel;
+use crate::fluid::product::FarFieldChoice;
 use crate::linear::LinearError;
 use crate::rod::configuration::node;
+
+/// Nodes up to which a resistance matrix is formed although steps do without the mobility's: with it, its factors and
+/// the mobility 3.5 GB.
+const MOST_RESISTANCES: usize = 4000;
 
 impl Simulation {
     /// Energies of stretching, bending and twisting, J.
@@ -70,21 +78,35 @@ impl Simulation {
             }
             return Ok(out);
         }
-        self.with_fluid(|fluid, velocity| fluid.force_density(velocity))
+        self.with_fluid(|fluid, velocity, pool| fluid.force_density(velocity, pool))
     }
 
     /// Resistance of the nodes (3N x 3N, column-major), N s/m: the force that moves them through the fluid at given velocities.
     ///
     /// # Errors
-    /// If the fluid's matrix is singular.
+    /// If the fluid's matrix is singular, or [`LinearError::MatrixFree`] if the scene has more than 4000 nodes and
+    /// the far-field crossover lies below.
     pub fn resistance(&mut self) -> Result<Vec<f64>, LinearError> {
         let nodes = self.model.network.node_count();
-        let mut out = vec![0.0; 9 * nodes * nodes];
         let positions = self.state.positions(&self.model.network);
-        let mut ignored = super::statistics::Statistics::default();
-        self.balance.place_fluid(&positions, &mut ignored)?;
-        self.forget_fluid();
-        let Some(fluid) = self.balance.fluid_mut() else {
+        let mobility = self.balance.fluid_mut().and_then(FluidModel::nonlocal);
+        let mut stored = match mobility.is_some_and(|mobility| mobility.is_matrix_free()) {
+            true if nodes > MOST_RESISTANCES => {
+                let gigabytes = 72e-9 * (nodes * nodes) as f64;
+                return Err(LinearError::MatrixFree { what: "resistance", nodes, gigabytes });
+            }
+            true => self.model.fluid_with(Some(&FarFieldChoice::NEVER))?,
+            false => None,
+        };
+        if let Some(fluid) = &mut stored {
+            fluid.update(&positions, self.balance.pool.as_deref())?;
+        } else {
+            let mut ignored = super::statistics::Statistics::default();
+            self.balance.place_fluid(&positions, &mut ignored)?;
+            self.forget_fluid();
+        }
+        let mut out = vec![0.0; 9 * nodes * nodes];
+        let Some(fluid) = stored.as_deref_mut().or_else(|| self.balance.fluid_mut()) else {
             return Ok(out);
         };
         let immersed = fluid.immersed().to_vec();
@@ -93,7 +115,7 @@ impl Simulation {
             for c in 0..3 {
                 column.fill(0.0);
                 column[3 * k + c] = 1.0;
-                fluid.resist(&mut column)?;
+                fluid.resist(&mut column, None)?;
                 let target = &mut out[(3 * source + c) * 3 * nodes..][..3 * nodes];
                 for (&node, force) in immersed.iter().zip(column.chunks_exact(3)) {
                     target[3 * node..3 * node + 3].copy_from_slice(force);
@@ -105,7 +127,7 @@ impl Simulation {
 
     fn with_fluid(
         &mut self,
-        solve: impl FnOnce(&mut (dyn crate::fluid::FluidModel + 'static), &mut [f64]) -> Result<(), LinearError>,
+        solve: impl FnOnce(&mut (dyn FluidModel + 'static), &mut [f64], Option<&ThreadPool>) -> Result<(), LinearError>,
     ) -> Result<Vec<f64>, LinearError> {
         let mut out = vec![0.0; 3 * self.model.network.node_count()];
         let positions = self.state.positions(&self.model.network);
@@ -113,12 +135,13 @@ impl Simulation {
         self.balance.place_fluid(&positions, &mut ignored)?;
         self.forget_fluid();
         let dofs = self.balance.fluid_dofs().to_vec();
+        let pool = self.balance.pool.clone();
         let Some(fluid) = self.balance.fluid_mut() else {
             return Ok(out);
         };
         let mut values: Vec<f64> =
             dofs.iter().flat_map(|&dof| (0..3).map(move |c| dof + c)).map(|dof| self.state.velocity[dof]).collect();
-        solve(fluid, &mut values)?;
+        solve(fluid, &mut values, pool.as_deref())?;
         for (&node, value) in fluid.immersed().iter().zip(values.chunks_exact(3)) {
             out[3 * node..3 * node + 3].copy_from_slice(value);
         }

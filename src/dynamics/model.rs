@@ -15,6 +15,7 @@ use crate::elastic::stretching::Stretching;
 use crate::elastic::twisting::Twisting;
 use crate::fluid::FluidModel;
 use crate::fluid::head::Head;
+use crate::fluid::product::FarFieldChoice;
 use crate::fluid::rft::ResistiveForce;
 use crate::fluid::rss::StokesletSegments;
 use crate::fluid::twist_drag::TwistDrag;
@@ -216,6 +217,14 @@ impl Model {
 
     /// A fresh drag model, with its own workspace.
     pub(super) fn fluid(&self) -> Result<Option<Box<dyn FluidModel>>, LinearError> {
+        self.fluid_with(None)
+    }
+
+    /// A fresh drag model with a choice of its own on when there is no matrix.
+    pub(super) fn fluid_with(
+        &self,
+        choice: Option<&FarFieldChoice>,
+    ) -> Result<Option<Box<dyn FluidModel>>, LinearError> {
         let Some(fluid) = self.specification.fluid.as_ref() else { return Ok(None) };
         let (edges, nodes) = (self.network.edges(), &self.specification.nodes);
         if !fluid.immersed.iter().any(|&immersed| immersed) {
@@ -225,9 +234,10 @@ impl Model {
             FluidModelSpecification::ResistiveForce { coefficients } => {
                 Box::new(ResistiveForce::new(edges, &fluid.immersed, coefficients))
             }
-            FluidModelSpecification::StokesletSegments { epsilon } => {
+            FluidModelSpecification::StokesletSegments { epsilon, far_field } => {
                 let local = preconditioner_drag(fluid.viscosity, &self.specification, epsilon);
-                Box::new(StokesletSegments::new(nodes, edges, &fluid.immersed, epsilon, fluid.viscosity, &local)?)
+                let (immersed, far_field) = (&fluid.immersed, choice.unwrap_or(far_field));
+                Box::new(StokesletSegments::new(nodes, edges, immersed, epsilon, fluid.viscosity, &local, far_field)?)
             }
         }))
     }

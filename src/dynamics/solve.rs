@@ -10,9 +10,12 @@
 //!
 //! satisfies the linearised force balance exactly, `a` being the rate of the backward difference. GMRES seeks the `b` for
 //! which the fluid's equation `A df - s a dq = -r2` holds too: with local resistance alone it would be `-r2` itself, so
-//! that the method needs only a few products with `A`. Should it fail, its matrix is formed and factored.
+//! that the method needs only a few products with `A`. Should it fail, its matrix is formed and factored, unless the scene is
+//! so large that `A` itself is never formed.
 
 use std::time::Instant;
+
+use rayon::ThreadPool;
 
 use super::balance::{Balance, Step, Unknowns, gather};
 use super::model::Model;
@@ -131,21 +134,31 @@ impl Balance {
         statistics: &mut Statistics,
     ) -> Result<(), LinearError> {
         self.work.rhs.iter_mut().zip(&self.residual).for_each(|(rhs, residual)| *rhs = -residual);
-        let Self { system, gmres, fluid, fluid_dofs, slip, work, .. } = self;
+        let Self { system, gmres, fluid, fluid_dofs, slip, work, pool, .. } = self;
         let Some(fluid) = implicit_nonlocal(fluid, step) else {
             return system.solve_refined(&work.rhs, &mut out.q);
         };
         let Work { rhs, seek, target, image, moved, density } = work;
         // The image of b = 0 carries the force balance's own right-hand side.
         system.solve_checked(rhs, moved)?;
-        let mut fluid_system =
-            FluidSystem { model, rate: step.rate, sparse: system, fluid, fluid_dofs, rhs: Some(rhs), moved, density };
+        let mut fluid_system = FluidSystem {
+            model,
+            rate: step.rate,
+            sparse: system,
+            fluid,
+            fluid_dofs,
+            rhs: Some(rhs),
+            moved,
+            density,
+            pool: pool.as_deref(),
+        };
         seek.fill(0.0);
         fluid_system.finish(seek, image)?;
         fluid_system.rhs = None;
         target.iter_mut().zip(slip.iter()).zip(image.iter()).for_each(|((t, slip), image)| *t = -slip - image);
         match gmres.solve(&mut fluid_system, target, seek, tolerance) {
             Ok(iterations) => statistics.krylov_iterations += iterations as u64,
+            Err(error) if fluid_system.is_matrix_free() => return Err(error),
             Err(_) => {
                 statistics.dense_solves += 1;
                 fluid_system.solve_densely(target, seek)?;
@@ -187,6 +200,7 @@ struct FluidSystem<'a> {
     rhs: Option<&'a [f64]>,
     moved: &'a mut [f64],
     density: &'a mut [f64],
+    pool: Option<&'a ThreadPool>,
 }
 
 impl FluidSystem<'_> {
@@ -215,11 +229,15 @@ impl FluidSystem<'_> {
         let rate = self.rate;
         let Some(mobility) = self.fluid.nonlocal() else { return Ok(()) };
         mobility.unweigh(self.density)?;
-        mobility.apply(self.density, image);
+        mobility.apply(self.density, image, self.pool)?;
         for (&dof, value) in self.fluid_dofs.iter().zip(image.chunks_exact_mut(3)) {
             (0..3).filter(|&c| !prescribed[dof + c]).for_each(|c| value[c] -= scale * rate * moved[dof + c]);
         }
         Ok(())
+    }
+
+    fn is_matrix_free(&mut self) -> bool {
+        self.fluid.nonlocal().is_some_and(|mobility| mobility.is_matrix_free())
     }
 
     fn solve_densely(&mut self, target: &[f64], seek: &mut [f64]) -> Result<(), LinearError> {

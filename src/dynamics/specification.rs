@@ -2,6 +2,7 @@
 
 use crate::Vec3;
 use crate::elastic::signal::Signal;
+use crate::fluid::product::FarFieldChoice;
 
 /// A motor at a hinge.
 #[derive(Debug, Clone)]
@@ -56,6 +57,8 @@ pub enum FluidModelSpecification {
     StokesletSegments {
         /// Regularization of every edge, m.
         epsilon: Vec<f64>,
+        /// When the mobility is multiplied without its matrix.
+        far_field: FarFieldChoice,
     },
 }
 

@@ -44,6 +44,12 @@ pub(crate) trait Lanes:
     /// The same for every vector of a tile.
     fn per_vector<T: Copy>(value: T) -> Self::PerVector<T>;
 
+    /// Eight numbers, in as many vectors as they take.
+    type Octet: Copy + AsRef<[Self]> + AsMut<[Self]>;
+
+    /// The same vector as often as eight numbers take it.
+    fn octet(vector: Self) -> Self::Octet;
+
     /// The same value in every lane.
     fn splat(value: f64) -> Self;
 

@@ -3,13 +3,17 @@
 //! * [`lanes`]: vectors of numbers on every machine's instructions, chosen at run time (all `unsafe` of the crate).
 //! * [`segment`]: integrals of a regularized Stokeslet over a straight segment.
 //! * [`stokeslet`]: mobility matrix, velocity field and hat-function weights of segment networks.
+//! * [`far_field`]: the mobility's product with a force density in time proportional to the number of nodes.
+//! * [`product`]: with a stored matrix or without, by the number of nodes.
 //! * [`rss`]: nonlocal drag by regularized Stokeslet segments.
 //! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
 //! * [`twist_drag`]: resistance of an edge to spinning about its own centreline.
 //! * [`head`]: drag and counter-torque of the seed's head.
 
+pub mod far_field;
 pub mod head;
 pub mod lanes;
+pub mod product;
 pub mod rft;
 pub mod rss;
 pub mod segment;
@@ -39,13 +43,13 @@ pub trait FluidModel: Send + Sync {
     ///
     /// # Errors
     /// If the solve fails.
-    fn resist(&mut self, velocity: &mut [f64]) -> Result<(), LinearError>;
+    fn resist(&mut self, velocity: &mut [f64], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError>;
 
     /// Force per length on the fluid at the given nodal velocities, N/m; in place.
     ///
     /// # Errors
     /// If the solve fails.
-    fn force_density(&mut self, velocity: &mut [f64]) -> Result<(), LinearError>;
+    fn force_density(&mut self, velocity: &mut [f64], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError>;
 
     /// Resistance of every immersed node on its own, N s/m: the whole model if it is local, else a preconditioner.
     fn local(&self) -> &[Mat3];
@@ -64,7 +68,13 @@ pub trait Mobility: Send + Sync {
     fn scale(&self) -> f64;
 
     /// `out = A f`.
-    fn apply(&self, density: &[f64], out: &mut [f64]);
+    ///
+    /// # Errors
+    /// If the product is made without the matrix, and there is no geometry yet.
+    fn apply(&mut self, density: &[f64], out: &mut [f64], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError>;
+
+    /// Whether products are made without the matrix; nothing of its size should then be formed.
+    fn is_matrix_free(&self) -> bool;
 
     /// `out = W f`.
     fn weigh(&self, density: &[f64], out: &mut [f64]);

@@ -53,7 +53,7 @@ impl FluidModel for ResistiveForce {
         Ok(())
     }
 
-    fn resist(&mut self, velocity: &mut [f64]) -> Result<(), LinearError> {
+    fn resist(&mut self, velocity: &mut [f64], _: Option<&rayon::ThreadPool>) -> Result<(), LinearError> {
         for (block, v) in self.blocks.iter().zip(velocity.chunks_exact_mut(3)) {
             let force = block * Vec3::new(v[0], v[1], v[2]);
             v.copy_from_slice(force.as_slice());
@@ -61,8 +61,8 @@ impl FluidModel for ResistiveForce {
         Ok(())
     }
 
-    fn force_density(&mut self, velocity: &mut [f64]) -> Result<(), LinearError> {
-        self.resist(velocity)?;
+    fn force_density(&mut self, velocity: &mut [f64], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError> {
+        self.resist(velocity, pool)?;
         for (length, v) in self.lengths.iter().zip(velocity.chunks_exact_mut(3)) {
             v.iter_mut().for_each(|component| *component /= length);
         }

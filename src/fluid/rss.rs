@@ -1,14 +1,14 @@
 //! Nonlocal drag by regularized Stokeslet segments: `8 pi mu u = A f`, forces `W f` (equations 12 to 14).
 //!
 //! `A` maps nodal force densities to nodal velocities by collocation and is not symmetric, so where its inverse is needed
-//! (the explicit scheme, resistance matrices) it is factored by LU; `W` holds the integrals of products of hat functions,
-//! so that total force and torque are exact (docs/theory, "Fluid").
+//! (the explicit scheme, resistance matrices) it is factored by LU, or, in scenes too large for a matrix, applied by GMRES;
+//! `W` holds the integrals of products of hat functions, so that total force and torque are exact (docs/theory, "Fluid").
 
+use super::product::{FarFieldChoice, Product};
 use super::rft::ResistiveForce;
-use super::stokeslet::{HatWeights, mobility};
+use super::stokeslet::HatWeights;
 use super::{FluidModel, Mobility, immersed_part};
 use crate::linear::LinearError;
-use crate::linear::dense::{DenseLu, multiply};
 use crate::linear::ldlt::SparseLdlt;
 use crate::linear::pattern::Pattern;
 use crate::{Mat3, Vec3};
@@ -20,9 +20,7 @@ pub struct StokesletSegments {
     epsilon: Vec<f64>,
     viscosity: f64,
     positions: Vec<Vec3>,
-    matrix: Vec<f64>,
-    lu: DenseLu,
-    factored: bool,
+    product: Product,
     weights: HatWeights,
     gram: Gram,
     scratch: Vec<f64>,
@@ -31,7 +29,7 @@ pub struct StokesletSegments {
 
 impl StokesletSegments {
     /// `epsilon` is the regularization of every edge of the network, m; `local` are drag coefficients along and across,
-    /// used for preconditioning only.
+    /// used for preconditioning only; `far_field` says from how many immersed nodes on there is no matrix.
     ///
     /// # Errors
     /// If the pattern of `W` cannot be analysed.
@@ -42,13 +40,12 @@ impl StokesletSegments {
         epsilon: &[f64],
         viscosity: f64,
         local: &[[f64; 2]],
+        far_field: &FarFieldChoice,
     ) -> Result<Self, LinearError> {
         let (own, own_edges, chosen) = immersed_part(edges, immersed);
         let positions: Vec<Vec3> = own.iter().map(|&node| nodes[node]).collect();
         Ok(Self {
-            matrix: vec![0.0; 9 * own.len() * own.len()],
-            lu: DenseLu::new(3 * own.len()),
-            factored: false,
+            product: Product::new(own.len(), far_field),
             weights: HatWeights::new(&positions, &own_edges),
             gram: Gram::new(own.len(), &own_edges)?,
             scratch: vec![0.0; 3 * own.len()],
@@ -59,15 +56,6 @@ impl StokesletSegments {
             viscosity,
             positions,
         })
-    }
-
-    fn factor(&mut self) -> Result<(), LinearError> {
-        if !self.factored {
-            self.lu.matrix_mut().copy_from_slice(&self.matrix);
-            self.lu.factor()?;
-            self.factored = true;
-        }
-        Ok(())
     }
 }
 
@@ -84,25 +72,32 @@ impl FluidModel for StokesletSegments {
         for (position, &node) in self.positions.iter_mut().zip(&self.nodes) {
             *position = nodes[node];
         }
-        mobility(&self.positions, &self.positions, &self.edges, &self.epsilon, &mut self.matrix, pool);
-        self.factored = false;
+        self.product.update(&self.positions, &self.edges, &self.epsilon, pool)?;
         self.weights.update(&self.positions);
         self.gram.update(&self.positions, &self.edges)?;
         self.local.update(nodes, pool)
     }
 
-    fn resist(&mut self, velocity: &mut [f64]) -> Result<(), LinearError> {
-        self.force_density(velocity)?;
+    fn resist(&mut self, velocity: &mut [f64], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError> {
+        self.force_density(velocity, pool)?;
         self.scratch.copy_from_slice(velocity);
         self.weights.apply(&self.scratch, velocity);
         Ok(())
     }
 
-    fn force_density(&mut self, velocity: &mut [f64]) -> Result<(), LinearError> {
-        self.factor()?;
+    fn force_density(&mut self, velocity: &mut [f64], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError> {
         let scale = self.scale();
         velocity.iter_mut().for_each(|component| *component *= scale);
-        self.lu.solve(velocity)
+        let Self { product, gram, local, .. } = self;
+        // A node's own drag, as if all others moved along.
+        let mut by_local_drag = |flow: &mut [f64]| {
+            for (block, u) in local.local().iter().zip(flow.chunks_exact_mut(3)) {
+                let force = block * Vec3::new(u[0], u[1], u[2]) / scale;
+                u.copy_from_slice(force.as_slice());
+            }
+            gram.solve(flow)
+        };
+        product.invert(velocity, &mut by_local_drag, pool)
     }
 
     fn local(&self) -> &[Mat3] {
@@ -123,8 +118,12 @@ impl Mobility for StokesletSegments {
         8.0 * std::f64::consts::PI * self.viscosity
     }
 
-    fn apply(&self, density: &[f64], out: &mut [f64]) {
-        multiply(&self.matrix, density, out);
+    fn apply(&mut self, density: &[f64], out: &mut [f64], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError> {
+        self.product.apply(density, out, pool)
+    }
+
+    fn is_matrix_free(&self) -> bool {
+        !self.product.is_stored()
     }
 
     fn weigh(&self, density: &[f64], out: &mut [f64]) {

@@ -35,4 +35,20 @@ pub enum LinearError {
         /// Iterations made.
         iterations: usize,
     },
+    /// An operator known only by its action could not be applied.
+    #[error("the product with the mobility failed: {0}")]
+    Product(String),
+    /// A dense matrix was asked for where none is ever formed.
+    #[error(
+        "the {what} of {nodes} nodes is a dense matrix of {gigabytes:.1} GB, which is not formed where products are \
+         made without it"
+    )]
+    MatrixFree {
+        /// Which matrix.
+        what: &'static str,
+        /// Nodes of the scene.
+        nodes: usize,
+        /// Its size, GB.
+        gigabytes: f64,
+    },
 }

@@ -5,6 +5,7 @@ use pyo3::types::PyDict;
 
 use crate::dynamics::model::ModelError;
 use crate::dynamics::simulation::StepError;
+use crate::fluid::far_field::{FarFieldError, LARGEST_TOLERANCE, SMALLEST_TOLERANCE};
 use crate::linear::LinearError;
 
 fn make(py: Python<'_>, class: &str, message: &str, details: &Bound<'_, PyDict>) -> PyErr {
@@ -44,6 +45,29 @@ pub fn model_error(py: Python<'_>, error: &ModelError) -> PyErr {
         ModelError::Overlap(overlap) => scene_error(py, "nodes", &overlap.to_string(), "a shape without overlaps"),
         other => make(py, "SceneError", &other.to_string(), &PyDict::new(py)),
     }
+}
+
+/// A product with the mobility that cannot be made.
+pub fn far_field_error(py: Python<'_>, error: &FarFieldError) -> PyErr {
+    let (field, value, allowed) = match error {
+        FarFieldError::Tolerance(value) => {
+            ("error".to_owned(), format!("{value:e}"), format!("{SMALLEST_TOLERANCE:e} to {LARGEST_TOLERANCE:e}"))
+        }
+        FarFieldError::Position { field, index, value } => {
+            (format!("{field}s[{index}]"), format!("{value:?}"), "finite".to_owned())
+        }
+        FarFieldError::Edge { edge, ends, nodes } => {
+            (format!("edges[{edge}]"), format!("{ends:?}"), format!("two of {nodes} nodes, at different positions"))
+        }
+        FarFieldError::Epsilon { edge, value, smallest } => {
+            (format!("epsilon[{edge}]"), format!("{value:e}"), format!("finite and > {smallest:e} m"))
+        }
+        FarFieldError::Length { field, actual, expected } => {
+            let field = if *field == "density" { "force_density" } else { field };
+            (field.to_owned(), format!("{actual} entries"), format!("{expected} entries"))
+        }
+    };
+    scene_error(py, &field, &value, &allowed)
 }
 
 /// A linear system that cannot be solved.

@@ -2,12 +2,14 @@
 //!
 //! * [`specification`]: a scene's plain data from a mapping of arrays.
 //! * [`simulation`]: the simulation class.
+//! * [`far_field`]: the product with the mobility without its matrix.
 //! * [`numerics`]: mobility, velocity and distances on plain arrays.
 //! * [`errors`]: errors of the core as Python exceptions.
 //! * [`arrays`]: positions and indices in and out of NumPy.
 
 mod arrays;
 mod errors;
+mod far_field;
 mod numerics;
 mod simulation;
 mod specification;
@@ -19,6 +21,7 @@ use pyo3::prelude::*;
 fn _flagrs(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<simulation::Simulation>()?;
+    module.add_class::<far_field::FastMobility>()?;
     module.add_function(wrap_pyfunction!(numerics::mobility, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::velocity, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::hat_weights, module)?)?;

@@ -12,6 +12,7 @@ use crate::dynamics::specification::{
     HeadSpecification, MotorSpecification, Specification,
 };
 use crate::elastic::signal::Signal;
+use crate::fluid::product::FarFieldChoice;
 
 /// A signal: a number, a pair of arrays (times, values), or a callable.
 #[derive(FromPyObject)]
@@ -70,6 +71,8 @@ struct FluidInput<'py> {
     twist_drag: bool,
     density: f64,
     epsilon: Option<PyReadonlyArray1<'py, f64>>,
+    far_field_error: f64,
+    far_field_nodes: usize,
     coefficients: Option<PyReadonlyArray2<'py, f64>>,
 }
 
@@ -189,11 +192,12 @@ fn fluid(input: FluidInput<'_>) -> FluidSpecification {
         .as_ref()
         .map(|array| array.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect());
     let epsilon = input.epsilon.as_ref().map(values).unwrap_or_default();
+    let far_field = FarFieldChoice { from: input.far_field_nodes, error: input.far_field_error };
     FluidSpecification {
         viscosity: input.viscosity,
         model: match coefficients {
             Some(coefficients) => FluidModelSpecification::ResistiveForce { coefficients },
-            None => FluidModelSpecification::StokesletSegments { epsilon },
+            None => FluidModelSpecification::StokesletSegments { epsilon, far_field },
         },
         immersed: input.immersed,
         twist_drag: input.twist_drag,

@@ -9,6 +9,7 @@ use flagrs::dynamics::specification::{
     HeadSpecification, MotorSpecification, Specification,
 };
 use flagrs::elastic::signal::Signal;
+use flagrs::fluid::product::FarFieldChoice;
 
 /// Least arc length of an edge of the flagella, m.
 const EDGE_LENGTH: f64 = 5e-3;
@@ -117,7 +118,10 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
         gravity: Vec3::zeros(),
         fluid: Some(FluidSpecification {
             viscosity: substance.viscosity,
-            model: FluidModelSpecification::StokesletSegments { epsilon: vec![substance.epsilon; e] },
+            model: FluidModelSpecification::StokesletSegments {
+                epsilon: vec![substance.epsilon; e],
+                far_field: FarFieldChoice::default(),
+            },
             immersed: vec![true; e],
             twist_drag: true,
             density: 0.0,

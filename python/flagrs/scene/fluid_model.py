@@ -10,10 +10,13 @@ from pydantic import PlainValidator
 
 from flagrs.errors import not_allowed
 from flagrs.scene.part import Part
-from flagrs.scene.values import Array, Bounds, Flag, FloatArray, number, optional_number
+from flagrs.scene.values import Array, Bounds, Flag, FloatArray, index, number, optional_number
 
 #: Regularization over rod radius, by name: matching slender-body theory, and the supplementary text's choice.
 EPSILON_RATIO = {"slender": math.sqrt(math.e), "seed": 1.031}
+
+#: Immersed nodes from which on a step takes less time without the segments' matrix (docs/performance.md).
+CROSSOVER = 500
 
 _length = Array(((),), Bounds("m", above=0.0))
 
@@ -24,6 +27,10 @@ def _epsilon(value: Any) -> Any:
             raise not_allowed("", value, "'slender', 'seed' or a length > 0 m")
         return value
     return _length(value)
+
+
+def _count(value: Any) -> int | None:
+    return None if value is None else index(value)
 
 
 class Fluid(Part):
@@ -47,6 +54,12 @@ class Fluid(Part):
     wavelength : float or None
         Wavelength of the filaments for these coefficients [m]: the pitch of a helix for ``gray-hancock``, the
         arc length of a turn for ``lighthill``. None: the immersed length of each rod, for straight ones.
+    far_field_error : float
+        Largest error of the product of the mobility with a force density, relative to its largest component,
+        where it is made by the fast multipole method: 1e-9 to 0.1.
+    far_field_nodes : int or None
+        Immersed nodes from which on the method is used and the dense matrix of the segments is never formed;
+        0: always. None: 500, where a step takes the same time either way.
     density : float
         Density of the fluid [kg/m^3], for buoyancy under gravity.
     """
@@ -57,7 +70,14 @@ class Fluid(Part):
     twist_drag: Flag = True
     coefficients: Literal["gray-hancock", "lighthill"] = "gray-hancock"
     wavelength: Annotated[float | None, optional_number(Bounds("m", above=0.0))] = None
+    far_field_error: Annotated[float, number(Bounds("1", at_least=1e-9, at_most=0.1))] = 1e-6
+    far_field_nodes: Annotated[int | None, PlainValidator(_count)] = None
     density: Annotated[float, number(Bounds("kg/m^3", at_least=0.0, at_most=3e4))] = 0.0
+
+    @property
+    def crossover(self) -> int:
+        """Immersed nodes from which on the segments' matrix is never formed."""
+        return CROSSOVER if self.far_field_nodes is None else self.far_field_nodes
 
     def epsilon_array(self, radius: FloatArray) -> FloatArray:
         """Return the regularization of each edge.

@@ -3,7 +3,7 @@
 use std::arch::aarch64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
-use super::{Lanes, TILE};
+use super::{Lanes, MOST_LANES, TILE};
 
 /// Two doubles.
 #[derive(Clone, Copy)]
@@ -50,10 +50,16 @@ impl Lanes for Neon {
     const WIDTH: usize = 2;
     type Mask = uint64x2_t;
     type PerVector<T: Copy> = [T; TILE / Self::WIDTH];
+    type Octet = [Self; MOST_LANES / Self::WIDTH];
 
     #[inline(always)]
     fn per_vector<T: Copy>(value: T) -> Self::PerVector<T> {
         [value; TILE / Self::WIDTH]
+    }
+
+    #[inline(always)]
+    fn octet(vector: Self) -> Self::Octet {
+        [vector; MOST_LANES / Self::WIDTH]
     }
 
     #[inline(always)]

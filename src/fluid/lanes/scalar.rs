@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use super::{Lanes, TILE};
+use super::{Lanes, MOST_LANES, TILE};
 
 /// A double; `FUSED` where multiplication with addition is one instruction.
 #[derive(Clone, Copy)]
@@ -44,10 +44,16 @@ impl<const FUSED: bool> Lanes for Scalar<FUSED> {
     const WIDTH: usize = 1;
     type Mask = bool;
     type PerVector<T: Copy> = [T; TILE];
+    type Octet = [Self; MOST_LANES];
 
     #[inline(always)]
     fn per_vector<T: Copy>(value: T) -> Self::PerVector<T> {
         [value; TILE]
+    }
+
+    #[inline(always)]
+    fn octet(vector: Self) -> Self::Octet {
+        [vector; MOST_LANES]
     }
 
     #[inline(always)]

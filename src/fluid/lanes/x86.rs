@@ -4,7 +4,7 @@ use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
 use super::scalar::Scalar;
-use super::{Kernel, Lanes, TILE};
+use super::{Kernel, Lanes, MOST_LANES, TILE};
 
 /// Runs a kernel one number at a time with fused multiplication and addition.
 #[target_feature(enable = "fma")]
@@ -100,10 +100,16 @@ impl Lanes for Avx2 {
     const WIDTH: usize = 4;
     type Mask = __m256d;
     type PerVector<T: Copy> = [T; TILE / Self::WIDTH];
+    type Octet = [Self; MOST_LANES / Self::WIDTH];
 
     #[inline(always)]
     fn per_vector<T: Copy>(value: T) -> Self::PerVector<T> {
         [value; TILE / Self::WIDTH]
+    }
+
+    #[inline(always)]
+    fn octet(vector: Self) -> Self::Octet {
+        [vector; MOST_LANES / Self::WIDTH]
     }
 
     #[inline(always)]
@@ -253,10 +259,16 @@ impl Lanes for Avx512 {
     const WIDTH: usize = 8;
     type Mask = __mmask8;
     type PerVector<T: Copy> = [T; TILE / Self::WIDTH];
+    type Octet = [Self; MOST_LANES / Self::WIDTH];
 
     #[inline(always)]
     fn per_vector<T: Copy>(value: T) -> Self::PerVector<T> {
         [value; TILE / Self::WIDTH]
+    }
+
+    #[inline(always)]
+    fn octet(vector: Self) -> Self::Octet {
+        [vector; MOST_LANES / Self::WIDTH]
     }
 
     #[inline(always)]

@@ -1,0 +1,150 @@
+//! How the mobility of regularized Stokeslet segments is multiplied and inverted: by a stored matrix in small scenes, by
+//! the fast multipole method and GMRES in large ones.
+
+use rayon::ThreadPool;
+
+use super::far_field::{FarField, FarFieldError};
+use super::stokeslet::mobility;
+use crate::Vec3;
+use crate::linear::LinearError;
+use crate::linear::dense::{DenseLu, multiply};
+use crate::linear::krylov::{Gmres, LinearOperator};
+
+/// Memory for the exact blocks of close pairs, bytes; those that do not fit are computed anew in every product.
+const BLOCK_MEMORY: usize = 2 << 30;
+
+/// GMRES iterations in which the mobility must be inverted; the local drag as preconditioner leaves a few tens.
+const KRYLOV_LIMIT: usize = 200;
+
+/// When the mobility is multiplied without its matrix, and how exactly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FarFieldChoice {
+    /// Immersed nodes from which on there is no matrix.
+    pub from: usize,
+    /// Largest error of a component of the product, relative to the largest component.
+    pub error: f64,
+}
+
+impl Default for FarFieldChoice {
+    /// From [`FarFieldChoice::CROSSOVER`] nodes on, to an error that is lost in that of the segments themselves.
+    fn default() -> Self {
+        Self { from: Self::CROSSOVER, error: 1e-6 }
+    }
+}
+
+impl FarFieldChoice {
+    /// Immersed nodes from which on a step takes less time without the matrix (docs/performance.md).
+    pub const CROSSOVER: usize = 500;
+
+    /// The matrix, whatever its size.
+    pub const NEVER: Self = Self { from: usize::MAX, error: 1e-6 };
+}
+
+/// The product with the mobility at a geometry.
+pub(super) enum Product {
+    /// The matrix, by columns.
+    Stored { matrix: Vec<f64>, lu: DenseLu, factored: bool },
+    /// No matrix; nothing before the first geometry.
+    Fast { error: f64, far_field: Option<Box<FarField>>, gmres: Gmres },
+}
+
+impl Product {
+    /// For so many immersed nodes.
+    pub fn new(nodes: usize, choice: &FarFieldChoice) -> Self {
+        if nodes >= choice.from {
+            Self::Fast {
+                error: choice.error,
+                far_field: None,
+                gmres: Gmres::new(3 * nodes, KRYLOV_LIMIT.min(3 * nodes)),
+            }
+        } else {
+            Self::Stored { matrix: vec![0.0; 9 * nodes * nodes], lu: DenseLu::new(3 * nodes), factored: false }
+        }
+    }
+
+    pub fn is_stored(&self) -> bool {
+        matches!(self, Self::Stored { .. })
+    }
+
+    /// Moves to a geometry.
+    pub fn update(
+        &mut self,
+        nodes: &[Vec3],
+        edges: &[[usize; 2]],
+        epsilon: &[f64],
+        pool: Option<&ThreadPool>,
+    ) -> Result<(), LinearError> {
+        match self {
+            Self::Stored { matrix, factored, .. } => {
+                mobility(nodes, nodes, edges, epsilon, matrix, pool);
+                *factored = false;
+            }
+            Self::Fast { far_field: Some(far_field), .. } => far_field.update(nodes, None, pool)?,
+            Self::Fast { error, far_field, .. } => {
+                let built = FarField::new(nodes, edges, epsilon, None, *error, BLOCK_MEMORY, pool)?;
+                *far_field = Some(Box::new(built));
+            }
+        }
+        Ok(())
+    }
+
+    /// `out = A f`.
+    pub fn apply(&mut self, density: &[f64], out: &mut [f64], pool: Option<&ThreadPool>) -> Result<(), LinearError> {
+        match self {
+            Self::Stored { matrix, .. } => multiply(matrix, density, out),
+            Self::Fast { far_field, .. } => placed(far_field)?.apply(density, out, pool)?,
+        }
+        Ok(())
+    }
+
+    /// `f <- A^-1 f`; `precondition` does so roughly.
+    pub fn invert(
+        &mut self,
+        flow: &mut [f64],
+        precondition: &mut dyn FnMut(&mut [f64]) -> Result<(), LinearError>,
+        pool: Option<&ThreadPool>,
+    ) -> Result<(), LinearError> {
+        match self {
+            Self::Stored { matrix, lu, factored } => {
+                if !*factored {
+                    lu.matrix_mut().copy_from_slice(matrix);
+                    lu.factor()?;
+                    *factored = true;
+                }
+                lu.solve(flow)
+            }
+            Self::Fast { error, far_field, gmres } => {
+                let mut system = System { far_field: placed(far_field)?, precondition, pool };
+                let rhs = flow.to_vec();
+                gmres.solve(&mut system, &rhs, flow, *error).map(|_| ())
+            }
+        }
+    }
+}
+
+fn placed(far_field: &mut Option<Box<FarField>>) -> Result<&mut FarField, LinearError> {
+    far_field.as_deref_mut().ok_or_else(|| LinearError::Product("it has no geometry yet".to_owned()))
+}
+
+impl From<FarFieldError> for LinearError {
+    fn from(error: FarFieldError) -> Self {
+        Self::Product(error.to_string())
+    }
+}
+
+/// The mobility as GMRES sees it.
+struct System<'a> {
+    far_field: &'a mut FarField,
+    precondition: &'a mut dyn FnMut(&mut [f64]) -> Result<(), LinearError>,
+    pool: Option<&'a ThreadPool>,
+}
+
+impl LinearOperator for System<'_> {
+    fn apply(&mut self, x: &[f64], out: &mut [f64]) -> Result<(), LinearError> {
+        Ok(self.far_field.apply(x, out, self.pool)?)
+    }
+
+    fn precondition(&mut self, x: &mut [f64]) -> Result<(), LinearError> {
+        (self.precondition)(x)
+    }
+}
