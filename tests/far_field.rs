@@ -123,7 +123,7 @@ fn assert_within(scene: &Scene, tolerance: f64, label: &str) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn error_is_within_the_tolerance_in_random_scenes(
@@ -162,8 +162,8 @@ proptest! {
 /// Sources and targets on one line and forces all alike: nothing averages out.
 #[test]
 fn error_is_within_the_tolerance_along_a_straight_rod() {
-    for exponent in [-2, -3, -4, -5, -6, -7, -8, -9] {
-        assert_within(&Scene::rod(6000), 10_f64.powi(exponent), "rod");
+    for exponent in [-2, -4, -6, -9] {
+        assert_within(&Scene::rod(4000), 10_f64.powi(exponent), "rod");
     }
 }
 

@@ -206,7 +206,7 @@ def draw(results: list[Result]) -> None:
             nodes,
             [result.product[error] for result in results],
             marker + "-",
-            label=f"multipoles, {error:.0e}",
+            label=f"multipoles, error {error:.0e}",
         )
         errors.loglog(
             nodes, [result.error[error] for result in results], marker + "-", color=line.get_color()
