@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
-use super::balance::{Balance, Step, Unknowns, gather};
+use super::balance::{Balance, Step, Unknowns};
 use super::model::Model;
 use super::statistics::Statistics;
 use crate::fluid::FluidModel;
@@ -26,6 +26,9 @@ use crate::linear::dense::DenseLu;
 use crate::linear::krylov::LinearOperator;
 use crate::linear::nearly_symmetric::NearlySymmetric;
 use crate::{Mat3, Vec3};
+
+/// Relative residual of a linear system from which on products of single precision are exact enough.
+const SINGLE_PRECISION: f64 = 1e-4;
 
 /// Vectors of the linear solves.
 pub(super) struct Work {
@@ -151,21 +154,25 @@ impl Balance {
             moved,
             density,
             pool: pool.as_deref(),
+            roughly: false,
         };
         seek.fill(0.0);
-        fluid_system.finish(seek, image)?;
+        fluid_system.complete(seek)?;
+        fluid_system.product(image)?;
         fluid_system.rhs = None;
+        fluid_system.roughly = tolerance >= SINGLE_PRECISION;
         target.iter_mut().zip(slip.iter()).zip(image.iter()).for_each(|((t, slip), image)| *t = -slip - image);
         match gmres.solve(&mut fluid_system, target, seek, tolerance) {
             Ok(iterations) => statistics.krylov_iterations += iterations as u64,
             Err(error) if fluid_system.is_matrix_free() => return Err(error),
             Err(_) => {
                 statistics.dense_solves += 1;
+                fluid_system.roughly = false;
                 fluid_system.solve_densely(target, seek)?;
             }
         }
         fluid_system.rhs = Some(rhs);
-        fluid_system.image(seek, image)?;
+        fluid_system.pair(seek)?;
         out.q.copy_from_slice(fluid_system.moved);
         out.density.copy_from_slice(fluid_system.density);
         Ok(())
@@ -201,11 +208,19 @@ struct FluidSystem<'a> {
     moved: &'a mut [f64],
     density: &'a mut [f64],
     pool: Option<&'a ThreadPool>,
+    /// Whether single precision will do.
+    roughly: bool,
 }
 
 impl FluidSystem<'_> {
-    /// `image = A df - s a dq` for the pair that belongs to `b`.
+    /// The pair that belongs to `b`, and its image `A df - s a dq`.
     fn image(&mut self, b: &[f64], image: &mut [f64]) -> Result<(), LinearError> {
+        self.pair(b)?;
+        self.product(image)
+    }
+
+    /// The pair that belongs to `b`.
+    fn pair(&mut self, b: &[f64]) -> Result<(), LinearError> {
         match self.rhs {
             Some(rhs) => self.moved.copy_from_slice(rhs),
             None => self.moved.fill(0.0),
@@ -213,25 +228,31 @@ impl FluidSystem<'_> {
         let scale = self.fluid.nonlocal().map_or(1.0, |mobility| mobility.scale());
         resist_locally(self.model, self.fluid, self.fluid_dofs, scale, b, self.moved);
         self.sparse.solve(self.moved)?;
-        self.finish(b, image)
+        self.complete(b)
     }
 
-    /// The image for a solution of the force balance that is known already.
-    fn finish(&mut self, b: &[f64], image: &mut [f64]) -> Result<(), LinearError> {
+    /// The force density that belongs to `b` and the displacement at hand.
+    fn complete(&mut self, b: &[f64]) -> Result<(), LinearError> {
         let scale = self.fluid.nonlocal().map_or(1.0, |mobility| mobility.scale());
-        let (moved, prescribed) = (&*self.moved, &self.model.prescribed);
-        gather(self.fluid_dofs, |dof| if prescribed[dof] { 0.0 } else { moved[dof] }, image);
-        for (k, block) in self.fluid.local().iter().enumerate() {
+        let free = |dof: usize| if self.model.prescribed[dof] { 0.0 } else { self.moved[dof] };
+        for (k, (block, &dof)) in self.fluid.local().iter().zip(self.fluid_dofs).enumerate() {
             let block: &Mat3 = block;
-            let velocity = Vec3::from_fn(|c, _| b[3 * k + c] / scale + self.rate * image[3 * k + c]);
+            let velocity = Vec3::from_fn(|c, _| b[3 * k + c] / scale + self.rate * free(dof + c));
             self.density[3 * k..3 * k + 3].copy_from_slice((block * velocity).as_slice());
         }
-        let rate = self.rate;
+        self.fluid.nonlocal().map_or(Ok(()), |mobility| mobility.unweigh(self.density))
+    }
+
+    fn product(&mut self, image: &mut [f64]) -> Result<(), LinearError> {
         let Some(mobility) = self.fluid.nonlocal() else { return Ok(()) };
-        mobility.unweigh(self.density)?;
-        mobility.apply(self.density, image, self.pool)?;
+        if self.roughly {
+            mobility.apply_roughly(self.density, image, self.pool)?;
+        } else {
+            mobility.apply(self.density, image, self.pool)?;
+        }
+        let factor = mobility.scale() * self.rate;
         for (&dof, value) in self.fluid_dofs.iter().zip(image.chunks_exact_mut(3)) {
-            (0..3).filter(|&c| !prescribed[dof + c]).for_each(|c| value[c] -= scale * rate * moved[dof + c]);
+            (0..3).filter(|&c| !self.model.prescribed[dof + c]).for_each(|c| value[c] -= factor * self.moved[dof + c]);
         }
         Ok(())
     }

@@ -73,6 +73,17 @@ pub trait Mobility: Send + Sync {
     /// If the product is made without the matrix, and there is no geometry yet.
     fn apply(&mut self, density: &[f64], out: &mut [f64], pool: Option<&rayon::ThreadPool>) -> Result<(), LinearError>;
 
+    /// `out = A f`, at least to single precision.
+    ///
+    /// # Errors
+    /// As [`Self::apply`].
+    fn apply_roughly(
+        &mut self,
+        density: &[f64],
+        out: &mut [f64],
+        pool: Option<&rayon::ThreadPool>,
+    ) -> Result<(), LinearError>;
+
     /// Whether products are made without the matrix; nothing of its size should then be formed.
     fn is_matrix_free(&self) -> bool;
 

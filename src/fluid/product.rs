@@ -43,7 +43,7 @@ impl FarFieldChoice {
 /// The product with the mobility at a geometry.
 pub(super) enum Product {
     /// The matrix, by columns.
-    Stored { matrix: Vec<f64>, lu: DenseLu, factored: bool },
+    Stored { matrix: Vec<f64>, single: SinglePrecision, lu: DenseLu, factored: bool },
     /// No matrix; nothing before the first geometry.
     Fast { error: f64, far_field: Option<Box<FarField>>, gmres: Gmres },
 }
@@ -58,7 +58,12 @@ impl Product {
                 gmres: Gmres::new(3 * nodes, KRYLOV_LIMIT.min(3 * nodes)),
             }
         } else {
-            Self::Stored { matrix: vec![0.0; 9 * nodes * nodes], lu: DenseLu::new(3 * nodes), factored: false }
+            Self::Stored {
+                matrix: vec![0.0; 9 * nodes * nodes],
+                single: SinglePrecision::default(),
+                lu: DenseLu::new(3 * nodes),
+                factored: false,
+            }
         }
     }
 
@@ -75,8 +80,9 @@ impl Product {
         pool: Option<&ThreadPool>,
     ) -> Result<(), LinearError> {
         match self {
-            Self::Stored { matrix, factored, .. } => {
+            Self::Stored { matrix, single, factored, .. } => {
                 mobility(nodes, nodes, edges, epsilon, matrix, pool);
+                single.rounded = false;
                 *factored = false;
             }
             Self::Fast { far_field: Some(far_field), .. } => far_field.update(nodes, None, pool)?,
@@ -91,10 +97,26 @@ impl Product {
     /// `out = A f`.
     pub fn apply(&mut self, density: &[f64], out: &mut [f64], pool: Option<&ThreadPool>) -> Result<(), LinearError> {
         match self {
-            Self::Stored { matrix, .. } => multiply(matrix, density, out),
+            Self::Stored { matrix, .. } => multiply(matrix, density, out, pool),
             Self::Fast { far_field, .. } => placed(far_field)?.apply(density, out, pool)?,
         }
         Ok(())
+    }
+
+    /// `out = A f` to single precision: half the memory to go through.
+    pub fn apply_roughly(
+        &mut self,
+        density: &[f64],
+        out: &mut [f64],
+        pool: Option<&ThreadPool>,
+    ) -> Result<(), LinearError> {
+        match self {
+            Self::Stored { matrix, single, .. } => {
+                single.apply(matrix, density, out, pool);
+                Ok(())
+            }
+            Self::Fast { .. } => self.apply(density, out, pool),
+        }
     }
 
     /// `f <- A^-1 f`; `precondition` does so roughly.
@@ -105,7 +127,7 @@ impl Product {
         pool: Option<&ThreadPool>,
     ) -> Result<(), LinearError> {
         match self {
-            Self::Stored { matrix, lu, factored } => {
+            Self::Stored { matrix, lu, factored, .. } => {
                 if !*factored {
                     lu.matrix_mut().copy_from_slice(matrix);
                     lu.factor()?;
@@ -119,6 +141,33 @@ impl Product {
                 gmres.solve(&mut system, &rhs, flow, *error).map(|_| ())
             }
         }
+    }
+}
+
+/// The matrix rounded to single precision, when it is first needed, and vectors to go with it.
+#[derive(Default)]
+pub(super) struct SinglePrecision {
+    matrix: Vec<f32>,
+    density: Vec<f32>,
+    flow: Vec<f32>,
+    rounded: bool,
+}
+
+impl SinglePrecision {
+    fn apply(&mut self, matrix: &[f64], density: &[f64], out: &mut [f64], pool: Option<&ThreadPool>) {
+        if !self.rounded {
+            self.matrix.clear();
+            self.matrix.extend(matrix.iter().map(|&entry| entry as f32));
+            self.rounded = true;
+        }
+        // Sizes of force densities are scaled out, which single precision need not hold.
+        let largest = density.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
+        let scale = if largest > 0.0 { largest } else { 1.0 };
+        self.density.clear();
+        self.density.extend(density.iter().map(|value| (value / scale) as f32));
+        self.flow.resize(out.len(), 0.0);
+        multiply(&self.matrix, &self.density, &mut self.flow, pool);
+        out.iter_mut().zip(&self.flow).for_each(|(out, flow)| *out = f64::from(*flow) * scale);
     }
 }
 

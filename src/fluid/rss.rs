@@ -122,6 +122,15 @@ impl Mobility for StokesletSegments {
         self.product.apply(density, out, pool)
     }
 
+    fn apply_roughly(
+        &mut self,
+        density: &[f64],
+        out: &mut [f64],
+        pool: Option<&rayon::ThreadPool>,
+    ) -> Result<(), LinearError> {
+        self.product.apply_roughly(density, out, pool)
+    }
+
     fn is_matrix_free(&self) -> bool {
         !self.product.is_stored()
     }
