@@ -4,7 +4,6 @@
 //! is pure geometry and runs in one direction: [`exclusion`] decides once, from the rest shape,
 //! which pairs of edges are neighbours along a rod and so can never count; [`broad_phase`] lists,
 //! for given node positions, the remaining pairs whose bounding boxes overlap; [`distance`]
-//!
 //! measures one pair, and is the only file that calls parry's segment-segment routine. Contact
 //! models stand on top of these three and add the mechanics. Lengths are in metres, but every
 //! decision is relative to the sizes at hand: nothing depends on the unit.
