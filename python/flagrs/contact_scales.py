@@ -40,8 +40,8 @@ def barrier_stiffness(scene: Scene, contact: Contact) -> float:
     if contact.stiffness is not None:
         return contact.stiffness
     thickness = 2.0 * max(float(rod.radius_array().max()) for rod in scene.rods)
-    reach = 2.0 * contact.tolerance_or_default() * thickness
-    return GATHERED * force_per_length(scene) / (MIDDLE_SLOPE * reach)
+    span = 2.0 * contact.tolerance_or_default() * thickness
+    return GATHERED * force_per_length(scene) / (MIDDLE_SLOPE * span)
 
 
 def slip_velocity(scene: Scene, contact: Contact) -> float:

@@ -206,7 +206,8 @@ class Simulation:
     def step(self, n: int = 1) -> None:
         """Make n steps of `dt`.
 
-        A step that does not converge is made in halves, quarters and so on.
+        A step that does not converge is made in halves, quarters and so on, or, with `rtol`, again with 0.4
+        of its length.
 
         Raises
         ------
@@ -349,6 +350,24 @@ class Simulation:
         """Return the longest stable step of the explicit scheme [s]: 2 / lambda_max(M^-1 Res)."""
         rows = (self.dof_of_node[:, None] + np.arange(3)).ravel()
         return explicit_limit(self.resistance(), self.mass[rows])
+
+    @property
+    def minimum_gap(self) -> float:
+        """Smallest distance of surfaces that may touch [m]: negative in an overlap, infinite without any."""
+        return self._native.minimum_gap
+
+    def contact_forces(self) -> tuple[IntArray, FloatArray]:
+        """Return the pairs that push each other, and how hard.
+
+        Returns
+        -------
+        pairs : ndarray
+            Edges (K, 2) in the scene's global numbering; the head as a sphere comes after the last edge.
+        forces : ndarray
+            Normal force (K,) of each pair [N].
+        """
+        state = self._native.state()
+        return state["contact_pairs"], state["contact_forces"]
 
     def frame(self) -> dict[str, Any]:
         """Return everything known of the present instant; see `flagrs.frame.FIELDS` for shapes and units."""

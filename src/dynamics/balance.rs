@@ -269,6 +269,11 @@ impl Balance {
         out.iter_mut().zip(&immersed).filter(|(_, wet)| !**wet).for_each(|(stiffness, _)| *stiffness += mean);
     }
 
+    /// From here to the end of the step, contact's matrix is its positive semidefinite part; whether that is new.
+    pub fn define_contact(&mut self) -> bool {
+        self.barrier.as_mut().is_some_and(BarrierTerm::define)
+    }
+
     /// Part of the way between two sets of degrees of freedom over which contact lets the nodes go.
     pub fn step_limit(&mut self, model: &Model, from: &[f64], to: &[f64], statistics: &mut Statistics) -> f64 {
         let start = Instant::now();

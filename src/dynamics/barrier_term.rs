@@ -12,10 +12,12 @@ pub(super) struct BarrierTerm {
     state: BarrierState,
     nodes: Vec<Vec3>,
     velocities: Vec<Vec3>,
-    towards: Vec<Vec3>,
+    /// Ends of the last path that was searched.
+    path: [Vec<Vec3>; 2],
     stencils: Vec<Vec<usize>>,
     slots: Vec<ElementSlots>,
     bound: bool,
+    curvature: Curvature,
 }
 
 fn place(q: &[f64], node_dofs: &[usize], out: &mut Vec<Vec3>) {
@@ -29,15 +31,24 @@ impl BarrierTerm {
             state: law.state(),
             nodes: Vec::new(),
             velocities: Vec::new(),
-            towards: Vec::new(),
+            path: [Vec::new(), Vec::new()],
             stencils: Vec::new(),
             slots: Vec::new(),
             bound: true,
+            curvature: Curvature::Exact,
         }
+    }
+
+    /// Takes the positive semidefinite part of the matrix until the next step; whether there is any that it was not taken of.
+    pub fn define(&mut self) -> bool {
+        let exact = self.curvature == Curvature::Exact;
+        self.curvature = Curvature::Definite;
+        exact && self.state.stencils().next().is_some()
     }
 
     /// Takes the forces and directions of friction from the beginning of a step.
     pub fn begin(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) {
+        self.curvature = Curvature::Exact;
         self.place(law, node_dofs, q);
         if law.lag(&mut self.state, &self.nodes) {
             self.bound = false;
@@ -124,7 +135,7 @@ impl BarrierTerm {
             }
             self.slots[element].add(&free[..width * width], values);
         };
-        law.add(&self.state, &self.nodes, Some(Curvature::Exact), |element, _, matrix| store(element, matrix, 1.0));
+        law.add(&self.state, &self.nodes, Some(self.curvature), |element, _, matrix| store(element, matrix, 1.0));
         if law.has_friction() {
             law.add_friction(&self.state, &self.velocities, true, |element, _, matrix| store(element, matrix, rate));
         }
@@ -132,12 +143,10 @@ impl BarrierTerm {
 
     /// Part of the way from `from` to `to` over which no pair comes too close.
     pub fn step_limit(&mut self, law: &BarrierLaw, node_dofs: &[usize], from: &[f64], to: &[f64]) -> f64 {
-        let mut start = std::mem::take(&mut self.velocities);
-        place(from, node_dofs, &mut start);
-        place(to, node_dofs, &mut self.towards);
-        let limit = law.step_limit(&mut self.state, &start, &self.towards);
-        self.velocities = start;
-        limit
+        let [start, end] = &mut self.path;
+        place(from, node_dofs, start);
+        place(to, node_dofs, end);
+        law.step_limit(&mut self.state, start, end)
     }
 
     /// Every pair that pushes at these degrees of freedom.

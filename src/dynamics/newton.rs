@@ -152,6 +152,10 @@ impl Newton<'_, '_> {
                     let _ = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
                     return Ok(());
                 }
+                if self.balance.define_contact() {
+                    size = self.evaluate_start()?;
+                    continue;
+                }
                 return Err(failure(Some(size), iteration, "the line search found no lower residual"));
             };
             self.accept();
@@ -182,12 +186,16 @@ impl Newton<'_, '_> {
                 // The first full steps may go uphill: the test itself is blurred while edges still turn by much.
                 let uphill = if length == full && iteration < UPHILL_ITERATIONS { UPHILL } else { 1.0 - 0.25 * length };
                 let sufficient = uphill * correction;
-                let trial = self.try_length(length)?;
-                let left = self.correction().ok()?;
+                let trial = self.try_length(length);
                 length *= 0.5;
-                (left < sufficient.max(tolerance)).then_some((trial, left))
+                let left = self.correction().ok()?;
+                trial.filter(|_| left < sufficient.max(tolerance)).map(|trial| (trial, left))
             });
             let Some((trial, left)) = lower else {
+                if self.balance.define_contact() {
+                    size = self.evaluate_start()?;
+                    continue;
+                }
                 return Err(failure(Some(size), iteration, "the line search found no smaller correction"));
             };
             self.accept();

@@ -128,6 +128,11 @@ impl Simulation {
     }
 
     #[getter]
+    fn minimum_gap(&mut self) -> f64 {
+        self.inner.smallest_gap().unwrap_or(f64::INFINITY)
+    }
+
+    #[getter]
     fn scheme(&self) -> &'static str {
         self.inner.scheme().name()
     }

@@ -20,6 +20,10 @@ def _count(value: Any) -> int:
 #: Tolerance by method where none is given.
 TOLERANCE = {"barrier": 0.05, "spillmann-teschner": 1e-2}
 
+#: Largest tolerance of the barrier: edges of a straight rod that are not left out are pi/2 sums of radii
+#: apart, and must not push each other.
+WIDEST = 0.5
+
 
 class Contact(Part):
     """Contact between edges, of one rod or of several, and between edges and the head.
@@ -65,10 +69,17 @@ class Contact(Part):
 
     @model_validator(mode="after")
     def _check(self) -> Contact:
-        if self.friction > 0.0 and self.method != "barrier":
+        if self.method == "barrier":
+            if self.tolerance_or_default() > WIDEST:
+                raise not_allowed(
+                    "tolerance", self.tolerance, f"at most {WIDEST:g} if the method is 'barrier'"
+                )
+            return self
+        if self.friction > 0.0:
             raise not_allowed("friction", self.friction, "0 unless the method is 'barrier'")
-        if self.head_radius is not None and self.method != "barrier":
-            raise not_allowed("head_radius", self.head_radius, "None unless the method is 'barrier'")
+        for field in ("slip_velocity", "stiffness", "head_radius"):
+            if getattr(self, field) is not None:
+                raise not_allowed(field, getattr(self, field), "None unless the method is 'barrier'")
         return self
 
     def tolerance_or_default(self) -> float:

@@ -19,8 +19,9 @@ PAIR_FLOPS = 200
 HINGE_FLOPS = 6000
 #: Operations of the fluid's products in a step per node, without a matrix: some thirty of about 10 us.
 FAST_FLOPS = 2.4e6
-#: Newton iterations of a typical step.
-NEWTON_ITERATIONS = 3
+#: Newton iterations of a typical step, and products with the fluid matrix in each.
+NEWTON_ITERATIONS = 2
+PRODUCTS = 8
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def _flops(scene: Scene, dense: int) -> float:
     elastic = NEWTON_ITERATIONS * HINGE_FLOPS * (scene.hinge_count + scene.edge_count)
     immersed_edges = sum(int(rod.immersed_array().sum()) for rod in scene.rods)
     assembly = PAIR_FLOPS * (dense / 3) * immersed_edges if dense else 0.0
-    return float(elastic + assembly + 2.0 / 3.0 * dense**3)
+    return float(elastic + assembly + NEWTON_ITERATIONS * PRODUCTS * 2.0 * dense**2)
 
 
 def _terms(scene: Scene) -> tuple[list[str], list[str]]:
