@@ -269,6 +269,13 @@ impl Balance {
         out.iter_mut().zip(&immersed).filter(|(_, wet)| !**wet).for_each(|(stiffness, _)| *stiffness += mean);
     }
 
+    /// Multiplies the smoothing velocity of friction by a factor.
+    pub fn widen_friction(&mut self, factor: f64) {
+        if let Some(barrier) = &mut self.barrier {
+            barrier.widen_friction(factor);
+        }
+    }
+
     /// Part of the way between two sets of degrees of freedom over which contact lets the nodes go.
     pub fn step_limit(&mut self, model: &Model, from: &[f64], to: &[f64]) -> f64 {
         match (model.barrier(), &mut self.barrier) {
