@@ -398,20 +398,32 @@ class Plectoneme:
 # --- a heap, pressed rods, crossing rods, rings ------------------------------------------------------------
 
 
-def heap(count: int = 10, friction: float = 0.0, seed: int = 0) -> Scene:
-    """Return rods above a trough of eleven fixed rails, which they fall into."""
+def heap(count: int = 10, friction: float = 0.0, seed: int = 1) -> Scene:
+    """Return rods above a trough of fixed rails, which they fall into."""
     rng = np.random.default_rng(seed)
-    side = [(0.009, 0.0), (0.018, 0.003), (0.023, 0.01), (0.025, 0.018), (0.026, 0.027)]
-    places = [(0.0, 0.0), *side, *((-y, z) for y, z in side)]
+    side = [(9.0, 0.0), (18.0, 0.0), (21.3, 1.2), (23.5, 4.0), (24.5, 7.3), (25.0, 10.7), (25.3, 14.1), (25.5, 17.5)]
+    places = [(0.0, 0.0), *((sign * 1e-3 * y, 1e-3 * z) for sign in (1.0, -1.0) for y, z in side)]
     rails = [
-        Rod.straight(length=0.12, edge_count=12, radius=1e-3, material=SILICONE, start=(-0.06, y, z))
+        Rod.straight(length=0.02, edge_count=4, radius=1e-3, material=SILICONE, start=(-0.01, y, z))
         for y, z in places
+    ]
+    rails += [
+        Rod.straight(
+            length=0.06,
+            edge_count=4,
+            radius=1e-3,
+            material=SILICONE,
+            start=(x, -0.03, z),
+            direction=(0.0, 1.0, 0.0),
+        )
+        for x in (-0.0135, 0.0135)
+        for z in np.arange(0.003, 0.03, 0.003)
     ]
     rods = []
     for k in range(count):
-        yaw = rng.uniform(-0.5, 0.5)
+        yaw = rng.uniform(-0.25, 0.25)
         direction = np.array([np.sin(yaw), np.cos(yaw), 0.0])
-        middle = np.array([rng.uniform(-0.02, 0.02), rng.uniform(-0.002, 0.002), 0.014 + 0.004 * k])
+        middle = np.array([rng.uniform(-0.004, 0.004), rng.uniform(-0.002, 0.002), 0.014 + 0.004 * k])
         start = tuple(middle - 0.018 * direction)
         rods.append(
             Rod.straight(
@@ -421,7 +433,7 @@ def heap(count: int = 10, friction: float = 0.0, seed: int = 0) -> Scene:
     return Scene(
         rods=(*rods, *rails),
         fluid=Fluid(viscosity=1.0, model="RFT"),
-        clamps=tuple(held(count + k, 12) for k in range(len(rails))),
+        clamps=tuple(held(count + k, 4) for k in range(len(rails))),
         contact=Contact(friction=friction),
         gravity=np.array([0.0, 0.0, -GRAVITY]),
     )
@@ -433,10 +445,14 @@ def weight(rod: Rod) -> float:
 
 
 def pressed(scale: float = 1.0, radius: float = 1e-3, viscosity: float = 0.1) -> Scene:
-    """Return a rod pressed across another one by forces on its ends; the other's ends are held."""
+    """Return a rod held at one end whose other end a force presses across a rod that is held at both ends."""
     gap = scale * (1e-3 + radius) * 1.2
     below = Rod.straight(
-        length=0.06 * scale, edge_count=7, radius=1e-3 * scale, material=SILICONE, start=(-0.027 * scale, 0.0, 0.0)
+        length=0.06 * scale,
+        edge_count=7,
+        radius=1e-3 * scale,
+        material=SILICONE,
+        start=(-0.027 * scale, 0.0, 0.0),
     )
     direction = np.array([0.6, 0.8, 0.0])
     above = Rod.straight(
@@ -444,15 +460,14 @@ def pressed(scale: float = 1.0, radius: float = 1e-3, viscosity: float = 0.1) ->
         edge_count=6,
         radius=radius * scale,
         material=SILICONE,
-        start=tuple(-0.0223 * scale * direction + np.array([0.0, 0.0, gap])),
+        start=tuple(-0.0273 * scale * direction + np.array([0.0, 0.0, gap])),
         direction=tuple(direction),
     )
-    force = np.array([0.0, 0.0, -5e-4]) * scale**2
     return Scene(
         rods=(below, above),
         fluid=Fluid(viscosity=viscosity, model="RFT"),
-        clamps=(Clamp(nodes=(0, 1, 6, 7), edges=(0, 6)), Clamp(rod=1, edges=(0,))),
-        loads=tuple(PointLoad(rod=1, node=node, force=force) for node in (0, 6)),
+        clamps=(Clamp(nodes=(0, 1, 6, 7), edges=(0, 6)), Clamp(rod=1, nodes=(0, 1), edges=(0,))),
+        loads=(PointLoad(rod=1, node=6, force=np.array([0.0, 0.0, -1e-3]) * scale**2),),
         contact=Contact(),
     )
 

@@ -95,7 +95,7 @@ def test_a_heap_of_ten_rods_rests_on_its_rails_with_its_whole_weight() -> None:
     sideways, up = forces[borne, :2].sum(axis=0), forces[borne, 2].sum()
     resisted = drag(simulation)[:free_nodes].sum(axis=0)
     # What creep is left is small, and the balance is closed with it.
-    assert np.abs(resisted).max() < 2e-2 * total
+    assert np.abs(resisted).max() < 1e-6 * total
     assert up - resisted[2] == pytest.approx(total, rel=1e-3)
     assert np.abs(sideways - resisted[:2]).max() < 1e-3 * total
 
@@ -105,8 +105,9 @@ def test_contact_between_free_rods_moves_nothing_as_a_whole() -> None:
     loads = (PointLoad(rod=0, node=3, force=np.array([0.0, 0.0, 1e-3])), *scene.loads)
     simulation = Simulation(scene.replace(clamps=(), loads=loads), dt=1e-3, threads=1)
     for _ in range(100):
+        resistance = simulation.resistance()  # the step's, at its beginning
         simulation.step()
-        force = drag(simulation).sum(axis=0)
+        force = (resistance @ simulation.velocities.ravel()).reshape(-1, 3).sum(axis=0)
         assert np.abs(force).max() < 1e-9 * 1e-3
     assert simulation.frame()["contacts"] > 0
 
@@ -148,7 +149,7 @@ def test_rings_pulled_through_each_other_stay_linked_or_not(
     simulation = Simulation(ring_pairs(30, 1, load), dt=dt, threads=1, **options)
     before = linking_numbers(simulation.nodes)
     assert np.abs(before - np.round(before)).max() < 1e-12 and 0 < np.abs(np.round(before)).sum() < 30
-    simulation.step(8)
+    simulation.step(6)
     assert np.abs(linking_numbers(simulation.nodes) - before).max() < 1e-12
     assert simulation.frame()["minimum_gap"] >= -0.05 * 2e-3
     assert simulation.frame()["contacts"] > 0 or dt < 1e-2 or load < 1e-2
@@ -168,7 +169,7 @@ def test_a_start_with_an_overlap_is_an_error_that_names_the_edges() -> None:
     assert all((after[name] == before[name]).all() for name in before)
 
 
-def settled(scene: Scene, scheme: str, dt: float, until: float, **options: float) -> Simulation:
+def settled(scene: Scene, scheme: str, dt: float, until: float, **options: Any) -> Simulation:
     """Return the simulation after a time."""
     simulation = Simulation(scene, scheme=scheme, dt=dt, threads=1, **options)
     while simulation.time < until * (1.0 - 1e-9):
@@ -202,12 +203,12 @@ def test_adaptive_steps_follow_the_motion_of_short_ones_through_contact() -> Non
 def test_a_run_goes_on_from_a_checkpoint_in_contact_to_the_last_bit(tmp_path: Path) -> None:
     scene = heap(4, friction=0.3)
     simulation = Simulation(scene, dt=4e-3, threads=1)
-    simulation.step(60)
+    simulation.step(200)
     assert simulation.frame()["contacts"] > 0
     simulation.checkpoint(tmp_path / "here.h5")
     again = Simulation.restore(tmp_path / "here.h5")
     both = Simulation(scene, dt=4e-3, threads=2)
-    both.step(60)
+    both.step(200)
     for other in (simulation, again, both):
         other.step(40)
     for name, values in simulation.state().items():
@@ -222,8 +223,14 @@ def test_rods_of_different_radii_rest_at_the_sum_of_both_and_bear_the_load(radiu
     simulation = settled(scene, "overdamped", 5e-2, 10.0)
     _, forces, _ = contact_forces(simulation)
     assert LEAST <= Watch(simulation).closest() < 1.05
-    # The edges that share the contact press in slightly different directions.
-    assert np.abs(forces.sum(axis=0) - [0.0, 0.0, -1e-3]).max() < 1e-2 * 1e-3
+    # What presses on the lower rod is what its clamps hold.
+    gradient, at = simulation.gradient(), simulation.dof_of_node
+    held_up = sum(gradient[at[node] : at[node] + 3] for node in (0, 1, 6, 7))
+    size = float(np.linalg.norm(held_up))
+    assert size > 1e-3
+    # Sizes are exact; directions are those of closest points, where an edge presses with its nodes too.
+    off = np.abs(np.linalg.norm(forces.sum(axis=0)) - size), np.abs(forces.sum(axis=0) + held_up).max()
+    assert off[0] < 1e-2 * size and off[1] < 4e-2 * size
 
 
 def test_a_branching_network_and_a_fold_touch_as_rods_do() -> None:
@@ -298,7 +305,7 @@ def test_a_rod_rests_on_the_head_as_on_a_sphere() -> None:
     assert LEAST <= nearest / (head_radius + 1e-3) < 1.05
     assert simulation.frame()["minimum_gap"] >= -0.05 * (head_radius + 1e-3)
     assert abs(middle[1]) < 1e-4
-    without = settled(scene.replace(contact=Contact()), "overdamped", 1e-2, 2.0)
+    without = settled(scene.replace(contact=Contact()), "overdamped", 1e-2, 4.0)
     assert without.nodes[3:, 2].max() < head_radius / 2.0
 
 
