@@ -9,11 +9,13 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from flagrs import ConvergenceError, Simulation
 from flagrs.plot.canvas import COLOURS, GREY, dress, legend, new_figure
+from matplotlib.axes import Axes
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
@@ -87,7 +89,12 @@ def friction() -> None:
     legend(right)
     figure.savefig(FIGURES / "contact_friction.png", dpi=160)
     shorter = Capstan(np.pi, 0.5)
-    row("capstan, pi, mu = 0.5, 80 steps instead of 20", f"{shorter.theory():.4f}", f"{shorter.ratio(80):.4f}", "")
+    row(
+        "capstan, pi, mu = 0.5, 80 steps instead of 20",
+        f"{shorter.theory():.4f}",
+        f"{shorter.ratio(80):.4f}",
+        "",
+    )
 
 
 def knot() -> None:
@@ -105,47 +112,60 @@ def knot() -> None:
                 print(f"knot, mu = {mu}: {error}")
                 break
             _, _, sizes = contact_forces(case.simulation)
-            rows.append([case.loop_radius(), case.force(), case.watch.closest(), sizes.sum(), case.shortening()])
+            rows.append(
+                [case.loop_radius(), case.force(), case.watch.closest(), sizes.sum(), case.shortening()]
+            )
         radius, force, _, total, end = np.array(rows[3:]).T
         thin = case.RADIUS / radius
         reduced = force * radius**2 / case.bending
-        left.plot(np.sqrt(thin), reduced, "-", color=colour, label=f"$\\mu$ = {mu}")
-        right.loglog(end / case.RADIUS, force * case.RADIUS**2 / case.bending, color=colour, label=f"$\\mu$ = {mu}")
+        loose = thin < 0.06  # beyond, the loop is no longer opposite to the braid
+        left.plot(np.sqrt(thin[loose]), reduced[loose], "-", color=colour, label=f"$\\mu$ = {mu}")
+        right.loglog(
+            end / case.RADIUS, force * case.RADIUS**2 / case.bending, color=colour, label=f"$\\mu$ = {mu}"
+        )
         if mu == 0.0:
-            slope, limit = np.polyfit(np.sqrt(thin[thin < 0.06]), reduced[thin < 0.06], 1)
+            slope, limit = np.polyfit(np.sqrt(thin[loose]), reduced[loose], 1)
+            line = np.array([0.0, 0.25])
+            left.plot(line, limit + slope * line, ":", color=colour, linewidth=1.0)
             plain = (thin, reduced)
-            row("loose knot, F R^2/EI as R grows (linear in sqrt(h/R))", "0.5", f"{limit:.3f}", f"slope {slope:.2f}")
+            row(
+                "loose knot, F R^2/EI as R grows (linear in sqrt(h/R))",
+                "0.5",
+                f"{limit:.3f}",
+                f"slope {slope:.2f}",
+            )
         else:
             there = np.interp(thin, *plain)
             more = (reduced - there) / (mu * total * radius**2 / case.bending)
-            some = thin < 0.06
             row(
                 f"knot, mu = {mu}: pull beyond the frictionless one over mu x sum of contact forces",
                 "1",
-                f"{more[some].mean():.2f} (from {more[some].min():.2f} to {more[some].max():.2f})",
+                f"{more[loose].mean():.2f} (from {more[loose].min():.2f} to {more[loose].max():.2f})",
                 "",
             )
             sigma = (reduced - there) / (mu * np.sqrt(1.0 / thin))
             row(
                 f"knot, mu = {mu}: sigma in F R^2/EI = 1/2 + mu sigma (R/h)^(1/2)",
-                "0.492",
-                f"{sigma[some].mean():.2f}",
+                "the same for every mu",
+                f"{sigma[loose].mean():.2f}",
                 f"h/R from {thin.min():.3f} to 0.06",
             )
-        statistics = case.simulation.statistics
+        statistics, tight = case.simulation.statistics, 1.0 / case.curvature().max() / case.RADIUS
         row(
-            f"knot, mu = {mu}: least distance of centrelines / 2r, to a curvature of {1.0 / case.curvature().max() / case.RADIUS:.1f} radii",
+            f"knot, mu = {mu}: least distance / 2r, bent to {tight:.1f} radii",
             "> 0.95",
             f"{case.watch.least:.4f}",
             f"{statistics['newton_iterations'] / statistics['steps']:.1f} iterations a step, "
-            f"{statistics['rejected_steps']} of {statistics['steps']} rejected, {time.perf_counter() - start:.0f} s",
+            f"{statistics['rejected_steps']} of {statistics['steps']} rejected",
         )
     left.axhline(0.5, color=GREY, linewidth=0.8, linestyle=":")
     left.set_xlim(0.0, None)
     left.set_ylim(0.0, None)
-    dress(left, "$(h/R)^{1/2}$", "$F R^2/EI$", "Trefoil knot (dotted: infinitely loose, 1/2)")
+    dress(left, "$(h/R)^{1/2}$", "$F R^2/EI$", "Loose trefoil knot (grey: $R\\to\\infty$, 1/2)")
     legend(left)
-    dress(right, "end shortening / h", "$F h^2/EI$", "Pull on the ends")
+    dress(right, "end shortening / h", "$F h^2/EI$", "Pull on the ends, to the tight knot")
+    right.set_xticks([40, 60, 100, 200], ["40", "60", "100", "200"])
+    right.minorticks_off()
     legend(right)
     figure.savefig(FIGURES / "contact_knot.png", dpi=160)
 
@@ -167,7 +187,12 @@ def plectoneme() -> None:
                 f"{values[name]:.5g}",
                 f"{100.0 * (values[name] / theory[name] - 1.0):+.1f} %",
             )
-        row(f"the same: least distance / 2r, spread of angle", "> 0.95", f"{case.watch.least:.4f}", f"{values['spread']:.0e} rad")
+        row(
+            "the same: least distance / 2r, spread of angle",
+            "> 0.95",
+            f"{case.watch.least:.4f}",
+            f"{values['spread']:.0e} rad",
+        )
         if count == 250:
             found.append((values, theory, case))
     values, theory, case = found[-1]
@@ -200,6 +225,31 @@ def plectoneme() -> None:
     figure.savefig(FIGURES / "contact_plectoneme.png", dpi=160)
 
 
+def draw(axes: Axes, simulation: Simulation, across: Array, up: Array, half: float) -> None:
+    """Draw edges at their thickness, the nearest last, in a window of +- half [mm] around the middle."""
+    x, edges, rods = simulation.nodes, simulation.edges, simulation.scene.rods
+    up = up - (up @ across) * across
+    up /= np.linalg.norm(up)
+    rod_of_edge = np.repeat(np.arange(len(rods)), [len(rod.edge_array()) for rod in rods])
+    held = {clamp.rod for clamp in simulation.scene.clamps if len(clamp.nodes) == len(rods[clamp.rod].nodes)}
+    free = np.isin(rod_of_edge, list(held), invert=True)
+    moving = np.unique(edges[free])
+    middle = 0.5 * (x[moving].max(axis=0) + x[moving].min(axis=0))
+    if len(rods) == 1 and half < 20.0:
+        middle = x[np.argmax(np.linalg.norm(np.diff(x, 2, axis=0), axis=1)) + 1]
+    flat = 1e3 * np.stack([(x - middle) @ across, (x - middle) @ up], axis=1)
+    depth = (x[edges].mean(axis=1) - middle) @ np.cross(across, up)
+    width = 2.0 * 2.2 * 72.0 / (2.0 * half)
+    for k in np.argsort(depth):
+        colour = COLOURS[rod_of_edge[k] % 6] if free[k] else GREY
+        ends = flat[edges[k]].T
+        axes.plot(*ends, "-", color="white", linewidth=1.25 * width, solid_capstyle="butt")
+        axes.plot(*ends, "-", color=colour, linewidth=width, solid_capstyle="round")
+    axes.set_aspect("equal")
+    axes.set_xlim(-half, half)
+    axes.set_ylim(-half, half)
+
+
 def shapes() -> None:
     """Pictures of the knot, the plectoneme and the heap."""
     figure = new_figure(8.4, 3.0)
@@ -213,27 +263,16 @@ def shapes() -> None:
     pile = Simulation(scene, dt=2e-3, threads=1)
     while pile.time < 3.0:
         pile.step()
+    up = ply.simulation.nodes[len(ply.simulation.nodes) // 2] - ply.simulation.nodes[[0, -1]].mean(axis=0)
+    flattest = np.linalg.svd(tight.simulation.nodes[40:81] - tight.simulation.nodes[40:81].mean(axis=0))[2]
+    along = tight.along
     views = (
-        (tight.simulation, tight.along, "Tight trefoil knot"),
-        (ply.simulation, np.array([1.0, 0.0, 0.0]), "Plectoneme"),
-        (pile, np.array([0.0, 1.0, 0.0]), "Ten rods after 3 s"),
+        (tight.simulation, along, flattest[1], 12.0, "Tight trefoil knot"),
+        (ply.simulation, np.array([1.0, 0.0, 0.0]), up, 80.0, "Plectoneme"),
+        (pile, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]), 30.0, "Ten rods after 3 s, from above"),
     )
-    for axes, (simulation, across, title) in zip(panels, views, strict=True):
-        x, edges = simulation.nodes, simulation.edges
-        middle = x.mean(axis=0)
-        if title == "Plectoneme":
-            up = np.array([0.0, 1.0, 0.0])
-            up = x[len(x) // 2] - 0.5 * (x[0] + x[-1])
-        else:
-            up = np.array([0.0, 0.0, 1.0]) if simulation is pile else np.linalg.svd(x - middle)[2][1]
-        up = up - (up @ across) * across
-        up /= np.linalg.norm(up)
-        flat = 1e3 * np.stack([(x - middle) @ across, (x - middle) @ up], axis=1)
-        for k, (a, b) in enumerate(edges):
-            fixed = simulation is pile and k >= 60
-            colour = GREY if fixed else COLOURS[(k // 6) % 6 if simulation is pile else 0]
-            axes.plot(*flat[[a, b]].T, "-", color=colour, linewidth=1.6 if not fixed else 0.8, solid_capstyle="round")
-        axes.set_aspect("equal")
+    for axes, (simulation, across, upwards, half, title) in zip(panels, views, strict=True):
+        draw(axes, simulation, across, upwards, half)
         dress(axes, "mm", "mm", title)
     figure.savefig(FIGURES / "contact_shapes.png", dpi=160)
 
@@ -253,7 +292,12 @@ def piles() -> None:
     borne = forces[(pairs[:, 0] < 60) & (pairs[:, 1] >= 60)].sum(axis=0)
     creep = float(np.abs(drag(simulation)[:70].sum(axis=0)).max())
     statistics = simulation.statistics
-    row("heap: force on the rails / weight", "1", f"{borne[2] / total:.5f}", f"drag of creep / weight {creep / total:.0e}")
+    row(
+        "heap: force on the rails / weight",
+        "1",
+        f"{borne[2] / total:.5f}",
+        f"drag of creep / weight {creep / total:.0e}",
+    )
     row(
         "heap: least distance / 2r",
         "> 0.95",
@@ -265,7 +309,8 @@ def piles() -> None:
 
 def crossings() -> None:
     """Rods driven through each other, rings pulled through each other."""
-    for options in ({}, {"rtol": 1e-3}):
+    choices: tuple[dict[str, Any], ...] = ({}, {"rtol": 1e-3})
+    for options in choices:
         for dt in (1e-3, 1e-2, 0.1, 1.0):
             least, failed, count = np.inf, 0, 0
             for speed in (0.1, 1.0, 100.0):
@@ -288,14 +333,15 @@ def crossings() -> None:
                 f"0 of {count} cross, least distance / 2r {least:.4f}",
                 f"{failed} ConvergenceErrors",
             )
-    for load, dt, options in (
+    pulls: tuple[tuple[float, float, dict[str, Any]], ...] = (
         (1e-4, 1e-3, {}),
         (1e-4, 0.1, {}),
         (1e-2, 1e-3, {}),
         (1e-2, 0.1, {}),
         (1e-2, 0.1, {"rtol": 1e-3}),
         (1.0, 1.0, {"rtol": 1e-2}),
-    ):
+    )
+    for load, dt, options in pulls:
         changed, least, contacts = 0, np.inf, 0
         for seed in (1, 2):
             simulation = Simulation(ring_pairs(30, seed, load), dt=dt, threads=1, **options)

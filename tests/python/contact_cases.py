@@ -136,7 +136,9 @@ def incline_theory(simulation: Simulation, angle: float) -> float:
     return float(slip * 2.0 * pull / (b + np.sqrt(b * b - 4.0 * a * pull)))
 
 
-def incline_velocity(angle: float, friction: float, slip_velocity: float, lengthwise: bool = False) -> tuple[float, float, float]:
+def incline_velocity(
+    angle: float, friction: float, slip_velocity: float, lengthwise: bool = False
+) -> tuple[float, float, float]:
     """Return velocity along the incline, theory's [m/s], and the power of friction [W]."""
     simulation = Simulation(incline(angle, friction, slip_velocity, lengthwise), dt=2e-3, threads=1)
     theory = incline_theory(simulation, angle)
@@ -148,7 +150,13 @@ def incline_velocity(angle: float, friction: float, slip_velocity: float, length
     velocity = float(simulation.velocities[:count, 0].mean())
     force = drag(simulation)[:count].sum(axis=0)
     rod = simulation.scene.rods[0]
-    weight = rod.material.density * np.pi * rod.radius_array()[0] ** 2 * rod.rest_lengths().sum() * simulation.scene.gravity
+    weight = (
+        rod.material.density
+        * np.pi
+        * rod.radius_array()[0] ** 2
+        * rod.rest_lengths().sum()
+        * simulation.scene.gravity
+    )
     _, contact, _ = contact_forces(simulation)
     rubbing = force - weight - contact.sum(axis=0)  # what is left of the balance is friction
     return velocity, theory, float(rubbing[0] * velocity)
@@ -310,7 +318,9 @@ class Knot:
 class Plectoneme:
     """A slack rod held at both ends, one of which turns until the rod wraps around itself."""
 
-    def __init__(self, edge_count: int = 250, turns: int = 16, length: float = 0.8, slack: float = 0.35) -> None:
+    def __init__(
+        self, edge_count: int = 250, turns: int = 16, length: float = 0.8, slack: float = 0.35
+    ) -> None:
         path = np.linspace(0.0, 1.0, 4001)
 
         def arch(height: float) -> Array:
@@ -401,7 +411,16 @@ class Plectoneme:
 def heap(count: int = 10, friction: float = 0.0, seed: int = 1) -> Scene:
     """Return rods above a trough of fixed rails, which they fall into."""
     rng = np.random.default_rng(seed)
-    side = [(9.0, 0.0), (18.0, 0.0), (21.3, 1.2), (23.5, 4.0), (24.5, 7.3), (25.0, 10.7), (25.3, 14.1), (25.5, 17.5)]
+    side = [
+        (9.0, 0.0),
+        (18.0, 0.0),
+        (21.3, 1.2),
+        (23.5, 4.0),
+        (24.5, 7.3),
+        (25.0, 10.7),
+        (25.3, 14.1),
+        (25.5, 17.5),
+    ]
     places = [(0.0, 0.0), *((sign * 1e-3 * y, 1e-3 * z) for sign in (1.0, -1.0) for y, z in side)]
     rails = [
         Rod.straight(length=0.02, edge_count=4, radius=1e-3, material=SILICONE, start=(-0.01, y, z))
@@ -427,7 +446,12 @@ def heap(count: int = 10, friction: float = 0.0, seed: int = 1) -> Scene:
         start = tuple(middle - 0.018 * direction)
         rods.append(
             Rod.straight(
-                length=0.036, edge_count=6, radius=1e-3, material=SILICONE, start=start, direction=tuple(direction)
+                length=0.036,
+                edge_count=6,
+                radius=1e-3,
+                material=SILICONE,
+                start=start,
+                direction=tuple(direction),
             )
         )
     return Scene(
@@ -441,7 +465,9 @@ def heap(count: int = 10, friction: float = 0.0, seed: int = 1) -> Scene:
 
 def weight(rod: Rod) -> float:
     """Return the weight of a rod of constant radius [N]."""
-    return float(rod.material.density * np.pi * rod.radius_array()[0] ** 2 * rod.rest_lengths().sum() * GRAVITY)
+    return float(
+        rod.material.density * np.pi * rod.radius_array()[0] ** 2 * rod.rest_lengths().sum() * GRAVITY
+    )
 
 
 def pressed(scale: float = 1.0, radius: float = 1e-3, viscosity: float = 0.1) -> Scene:
@@ -519,11 +545,13 @@ def ring_pairs(count: int, seed: int, load: float) -> Scene:
             # Towards each other, so that they meet, and on, so that they would pass.
             loads += [PointLoad(rod=len(rods), node=node, force=force) for node in range(0, RING_EDGES, 2)]
             rods.append(Rod(nodes=ring + middle, edges=edges, radius=1e-3, material=SILICONE))
-    return Scene(rods=tuple(rods), fluid=Fluid(viscosity=1.0, model="RFT"), loads=tuple(loads), contact=Contact())
+    return Scene(
+        rods=tuple(rods), fluid=Fluid(viscosity=1.0, model="RFT"), loads=tuple(loads), contact=Contact()
+    )
 
 
 def linking_numbers(nodes: Array) -> Array:
-    """Return the linking number (P,) of every two rings in nodes (2 P * RING_EDGES, 3), by Gauss's integral."""
+    """Return the linking numbers (P,) of pairs of rings, nodes (2 P * RING_EDGES, 3), by Gauss's integral."""
     rings = nodes.reshape(-1, 2, RING_EDGES, 3)
     nexts = np.roll(rings, -1, axis=2)
     corners = [

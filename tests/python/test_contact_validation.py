@@ -24,7 +24,18 @@ from contact_cases import (
     ring_pairs,
     weight,
 )
-from flagrs import Clamp, Contact, ConvergenceError, Fluid, Head, PointLoad, Rod, Scene, SceneError, Simulation
+from flagrs import (
+    Clamp,
+    Contact,
+    ConvergenceError,
+    Fluid,
+    Head,
+    PointLoad,
+    Rod,
+    Scene,
+    SceneError,
+    Simulation,
+)
 
 #: Centrelines never come closer than this part of the sum of radii: 1 - the default tolerance.
 LEAST = 0.95
@@ -203,12 +214,12 @@ def test_adaptive_steps_follow_the_motion_of_short_ones_through_contact() -> Non
 def test_a_run_goes_on_from_a_checkpoint_in_contact_to_the_last_bit(tmp_path: Path) -> None:
     scene = heap(4, friction=0.3)
     simulation = Simulation(scene, dt=4e-3, threads=1)
-    simulation.step(200)
+    simulation.step(400)
     assert simulation.frame()["contacts"] > 0
     simulation.checkpoint(tmp_path / "here.h5")
     again = Simulation.restore(tmp_path / "here.h5")
     both = Simulation(scene, dt=4e-3, threads=2)
-    both.step(200)
+    both.step(400)
     for other in (simulation, again, both):
         other.step(40)
     for name, values in simulation.state().items():
@@ -236,7 +247,9 @@ def test_rods_of_different_radii_rest_at_the_sum_of_both_and_bear_the_load(radiu
 def test_a_branching_network_and_a_fold_touch_as_rods_do() -> None:
     # A fork that lies on a rail with both arms, and whose weight it bears.
     stem = np.array([[-0.03 + 0.01 * k, 0.0, 0.0] for k in range(4)])
-    arms = [stem[-1] + 0.008 * k * np.array([0.8, side * 0.6, 0.0]) for side in (1.0, -1.0) for k in (1, 2, 3)]
+    arms = [
+        stem[-1] + 0.008 * k * np.array([0.8, side * 0.6, 0.0]) for side in (1.0, -1.0) for k in (1, 2, 3)
+    ]
     fork = Rod(
         nodes=np.concatenate([stem, arms]) + np.array([0.0, 0.0, 2.1e-3]),
         edges=[[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 6], [3, 7], [7, 8], [8, 9]],
@@ -288,7 +301,12 @@ def test_a_rod_rests_on_the_head_as_on_a_sphere() -> None:
     head_radius = 8e-3
     carrier = Rod.straight(length=0.02, edge_count=2, radius=1e-3, material=SILICONE, start=(-0.01, 0.0, 0.0))
     above = Rod.straight(
-        length=0.03, edge_count=5, radius=1e-3, material=SILICONE, start=(0.0, -0.015, 0.0095), direction=(0, 1, 0)
+        length=0.03,
+        edge_count=5,
+        radius=1e-3,
+        material=SILICONE,
+        start=(0.0, -0.015, 0.0095),
+        direction=(0, 1, 0),
     )
     scene = Scene(
         rods=(carrier, above),
