@@ -236,7 +236,8 @@ def draw(axes: Axes, simulation: Simulation, across: Array, up: Array, half: flo
     moving = np.unique(edges[free])
     middle = 0.5 * (x[moving].max(axis=0) + x[moving].min(axis=0))
     if len(rods) == 1 and half < 20.0:
-        middle = x[np.argmax(np.linalg.norm(np.diff(x, 2, axis=0), axis=1)) + 1]
+        bent = np.linalg.norm(np.diff(x, 2, axis=0), axis=1)
+        middle = x[1:-1][bent > 0.3 * bent.max()].mean(axis=0)
     flat = 1e3 * np.stack([(x - middle) @ across, (x - middle) @ up], axis=1)
     depth = (x[edges].mean(axis=1) - middle) @ np.cross(across, up)
     width = 2.0 * 2.2 * 72.0 / (2.0 * half)
@@ -269,7 +270,7 @@ def shapes() -> None:
     views = (
         (tight.simulation, along, flattest[1], 12.0, "Tight trefoil knot"),
         (ply.simulation, np.array([1.0, 0.0, 0.0]), up, 80.0, "Plectoneme"),
-        (pile, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]), 30.0, "Ten rods after 3 s, from above"),
+        (pile, np.array([0.0, 1.0, 0.0]), np.array([-1.0, 0.0, 0.0]), 30.0, "Ten rods after 3 s, from above"),
     )
     for axes, (simulation, across, upwards, half, title) in zip(panels, views, strict=True):
         draw(axes, simulation, across, upwards, half)

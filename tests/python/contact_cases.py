@@ -276,9 +276,9 @@ class Knot:
         ends = ((0, 1), (edge_count - 1, edge_count))
         pulls = (-0.5 * speed * self.along, 0.5 * speed * self.along)
         clamps = tuple(Clamp(nodes=nodes, velocity=pull) for nodes, pull in zip(ends, pulls, strict=True))
-        # Of a rod bent to ten radii, as the tight knot is, not of the loose one it starts from.
-        stiffness = 0.1 * self.bending / (10.0 * self.RADIUS) ** 3 / (0.1 * 2.0 * self.RADIUS)
-        contact = Contact(friction=friction, slip_velocity=1e-3 * speed, stiffness=10.0 * stiffness)
+        # Of the force per length of a rod bent to ten radii, as the tight knot is, over the barrier's range.
+        stiffness = self.bending / (10.0 * self.RADIUS) ** 3 / (0.1 * 2.0 * self.RADIUS)
+        contact = Contact(friction=friction, slip_velocity=1e-3 * speed, stiffness=stiffness)
         fluid = Fluid(viscosity=1e-3, model="RFT")
         self.scene = Scene(rods=(rod,), fluid=fluid, clamps=clamps, contact=contact)
         self.simulation = Simulation(self.scene, dt=1e-4 / speed, threads=1)
