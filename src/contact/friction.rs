@@ -24,6 +24,13 @@ pub struct Friction {
     pub smoothing_velocity: f64,
 }
 
+impl Friction {
+    /// The same friction with the smoothing velocity times a factor.
+    pub fn widened(&self, factor: f64) -> Self {
+        Self { smoothing_velocity: factor * self.smoothing_velocity, ..*self }
+    }
+}
+
 /// A contact as it is when friction is applied to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaggedContact {

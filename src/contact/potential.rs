@@ -36,6 +36,8 @@ pub struct BarrierState {
     /// Ascending: the candidates and, besides, the pairs with friction.
     elements: Vec<Element>,
     lagged: Vec<Lagged>,
+    /// Factor on the smoothing velocity of friction.
+    widening: f64,
 }
 
 #[derive(Clone)]
@@ -142,7 +144,7 @@ impl BarrierLaw {
     /// A state without pairs; [`Self::ensure`] fills it.
     pub fn state(&self) -> BarrierState {
         let candidates = Candidates::new(&self.bodies, self.delta, self.skin);
-        BarrierState { candidates, elements: Vec::new(), lagged: Vec::new() }
+        BarrierState { candidates, elements: Vec::new(), lagged: Vec::new(), widening: 1.0 }
     }
 
     /// Makes the state's elements hold every pair in range of `nodes` (m), and says whether they have changed, and with them the
@@ -225,9 +227,13 @@ impl BarrierLaw {
         changed
     }
 
+    fn friction_of(&self, state: &BarrierState) -> Option<Friction> {
+        self.friction.map(|friction| friction.widened(state.widening))
+    }
+
     /// Dissipation potential of friction (W) at the velocities of the nodes (m/s).
     pub fn friction_potential(&self, state: &BarrierState, velocities: &[Vec3]) -> f64 {
-        let Some(friction) = &self.friction else { return 0.0 };
+        let Some(friction) = &self.friction_of(state) else { return 0.0 };
         let potential =
             |lagged: &Lagged| lagged.contact.potential(friction, &lagged.contact.nodes.map(|n| velocities[n]));
         state.lagged.iter().map(potential).sum()
@@ -242,7 +248,7 @@ impl BarrierLaw {
         with_matrix: bool,
         mut add: impl FnMut(usize, &[f64], Option<&[f64]>),
     ) {
-        let Some(friction) = &self.friction else { return };
+        let Some(friction) = &self.friction_of(state) else { return };
         for Lagged { element, contact, .. } in &state.lagged {
             let velocities = contact.nodes.map(|node| velocities[node]);
             let gradient = contact.gradient(friction, &velocities);
@@ -358,6 +364,12 @@ impl Element {
 }
 
 impl BarrierState {
+    /// Multiplies the smoothing velocity of friction by a factor: a problem that is easier to solve, from whose solution the
+    /// given one is found.
+    pub fn widen_friction(&mut self, factor: f64) {
+        self.widening = factor;
+    }
+
     /// Distinct nodes of every element, in the order of its gradient and matrix.
     pub fn stencils(&self) -> impl Iterator<Item = &[usize]> {
         self.elements.iter().map(|element| &element.nodes[..element.count])

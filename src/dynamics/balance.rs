@@ -274,6 +274,13 @@ impl Balance {
         self.barrier.as_mut().is_some_and(BarrierTerm::define)
     }
 
+    /// Multiplies the smoothing velocity of friction by a factor.
+    pub fn widen_friction(&mut self, factor: f64) {
+        if let Some(barrier) = &mut self.barrier {
+            barrier.widen_friction(factor);
+        }
+    }
+
     /// Part of the way between two sets of degrees of freedom over which contact lets the nodes go.
     pub fn step_limit(&mut self, model: &Model, from: &[f64], to: &[f64], statistics: &mut Statistics) -> f64 {
         let start = Instant::now();

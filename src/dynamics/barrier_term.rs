@@ -55,6 +55,11 @@ impl BarrierTerm {
         }
     }
 
+    /// Multiplies the smoothing velocity of friction by a factor.
+    pub fn widen_friction(&mut self, factor: f64) {
+        self.state.widen_friction(factor);
+    }
+
     /// Where the list of near pairs was made, m: part of a state, since results depend on the list in their last digits.
     pub fn anchor(&self) -> &[Vec3] {
         self.state.anchor()

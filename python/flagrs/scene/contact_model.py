@@ -45,9 +45,9 @@ class Contact(Part):
         Relative velocity above which contacts slide with the whole force of friction, below they creep [m/s];
         None: a thousandth of the velocity that typical forces give the filaments.
     stiffness : float or None
-        Stiffness of the barrier [Pa]; None: the one at which five times the scene's typical force per length
-        (drag of what turns, or weight; bending, if there is neither) keeps centrelines just the sum of the
-        radii apart.
+        Stiffness of the barrier [Pa]; None: the one at which five times the scene's drag, weight or load per
+        length, or a tenth of the force that bends rods as they are at rest, keeps centrelines just the sum of
+        the radii apart.
     head_radius : float or None
         Radius of the head as a sphere that rods cannot enter [m]; ``barrier`` only. None: rods pass through
         the head, whose radius for drag need not be its shape.
