@@ -1,6 +1,6 @@
 """Bundles of clamped flagella in contact: time of long runs, two methods side by side, speed against error.
 
-Run ``python benches/python/bundles.py [--document docs/performance.md]``; about ten minutes.
+Run ``python benches/python/bundles.py [--document docs/performance.md]``; about half an hour.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ def main() -> None:
     print(compared, flush=True)
     runs = {}
     for count in PUBLISHED:
-        runs[count] = long_run(count, PUBLISHED_TIME if count < 10 else 40.0)
+        runs[count] = long_run(count, PUBLISHED_TIME)
         print(count, runs[count].seconds, flush=True)
     draw(runs)
     publish("bundles", f"{machine('numpy')}\n\n{long_runs(runs)}\n\n{compared}", document)
