@@ -23,6 +23,8 @@ PUBLISHED_TIME = 250.0
 PUBLISHED = {2: 0.57, 3: 1.19, 5: 3.34, 10: 22.8}
 #: Radius of the filaments [m]; helix radius, the size that errors refer to [m].
 RADIUS, HELIX_RADIUS = 1e-3, 10e-3
+#: Simulated time of the robots [s].
+ROBOT_TIME = 100.0
 #: Error asked for in the long runs.
 RTOL = 1e-2
 #: Time between rows of the figure [s].
@@ -111,6 +113,42 @@ def long_runs(runs: dict[int, History]) -> str:
                 f"{run.contacts.max():.0f}",
             ]
         )
+    return table(head, rows)
+
+
+def robots() -> str:
+    """Return what the robot's flagella do at 50 rpm, over all accepted steps."""
+    rows = []
+    for pitch in (5.0, 7.0, 9.0):
+        scene = flagrs.scenarios.robot(normalized_pitch=pitch, rpm=50.0)
+        simulation = flagrs.Simulation(scene, rtol=RTOL, threads=1)
+        diameter = 2.0 * float(scene.rods[0].radius_array().min())
+        gap, touching = np.inf, 0
+        while simulation.time < ROBOT_TIME:
+            simulation.step()
+            gap = min(gap, simulation.minimum_gap / diameter)
+            touching += len(simulation.contact_forces()[1]) > 0
+        counts = simulation.statistics
+        rows.append(
+            [
+                f"{pitch:g}",
+                f"{ROBOT_TIME / counts['seconds_total']:.0f}",
+                f"{counts['steps']:.0f}",
+                f"{counts['rejected_steps']:.0f}",
+                f"{counts['newton_iterations'] / counts['steps']:.2f}",
+                f"{touching}",
+                f"{gap:+.3f}",
+            ]
+        )
+    head = (
+        f"pitch / R, robot at 50 rpm, {ROBOT_TIME:g} s",
+        "times real time",
+        "steps",
+        "rejected",
+        "Newton per step",
+        "steps in contact",
+        "smallest gap / 2r",
+    )
     return table(head, rows)
 
 
@@ -234,7 +272,7 @@ def main() -> None:
         runs[count] = long_run(count, PUBLISHED_TIME)
         print(count, runs[count].seconds, flush=True)
     draw(runs)
-    publish("bundles", f"{machine('numpy')}\n\n{long_runs(runs)}\n\n{compared}", document)
+    publish("bundles", f"{machine('numpy')}\n\n{long_runs(runs)}\n\n{robots()}\n\n{compared}", document)
 
 
 if __name__ == "__main__":
