@@ -18,6 +18,8 @@ SLIP_SHARE = 1e-3
 FREE_ROOT = 4.73
 #: A contact gathers the load of stretches to both sides: forces per length of contact over the typical one.
 GATHERED = 5.0
+#: Strain of edges that have nothing else to bear.
+STRETCHED = 1e-3
 #: Part of the force that bends a rod as far as it is bent at rest which contact may have to bear.
 BENT = 0.1
 
@@ -27,7 +29,9 @@ def force_per_length(scene: Scene) -> float:
     rods = _yielding(scene)
     loaded = max((_load(scene, load) for load in scene.loads), default=0.0)
     driven = max(loaded, *(max(_drag(scene, rod), _weight(scene, rod)) for rod in rods))
-    return max(GATHERED * driven, *(BENT * _bending(rod) for rod in rods))
+    borne = max(GATHERED * driven, *(BENT * _bending(rod) for rod in rods))
+    # Single edges that nothing drives: what stretches them by a thousandth, over their length.
+    return borne or max(STRETCHED * float(rod.EA_array().max() / rod.rest_lengths().sum()) for rod in rods)
 
 
 def typical_velocity(scene: Scene) -> float:

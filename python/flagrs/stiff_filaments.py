@@ -100,7 +100,9 @@ def immersed_body(scene: Scene) -> Body:
     graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(used), len(used)))
     count, filament = connected_components(graph, directed=False)
     centres = np.array([points[filament == k].mean(axis=0) for k in range(count)])
-    axes = np.array([np.linalg.svd(points[filament == k] - centres[k])[2][0] for k in range(count)])
+    axes = np.array(
+        [np.linalg.svd(points[filament == k] - centres[k], full_matrices=False)[2][0] for k in range(count)]
+    )
     return Body(points, edges, radius, np.arange(len(edges)), filament.astype(np.int64), centres, axes)
 
 

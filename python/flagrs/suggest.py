@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagrs.errors import SceneError
+from flagrs.errors import SceneError, not_allowed
 from flagrs.scene import Fluid, Scene
 from flagrs.scene.plan import CURED_EDGE
 from flagrs.scene.shapes import number
@@ -16,6 +16,9 @@ from flagrs.stiff_filaments import Body, immersed_body, rft_response, rss_respon
 #: Error of a run over the relative error its steps keep to, at most: 3.5, of four problems from 1e-2 to 1e-6
 #: (docs/performance.md, "rtol holds").
 ACHIEVED_OVER_ASKED = 4.0
+
+#: Immersed nodes up to which a scene is judged, by dense matrices of twice as many.
+MOST_NODES = 2000
 
 #: Part of the error that the mesh may be worth; time steps get the other half.
 MESH_SHARE = 0.5
@@ -83,7 +86,7 @@ def suggest(scene: Scene, error: float = 1e-2) -> Suggestion:
     Raises
     ------
     SceneError
-        If the error is out of range.
+        If the error is out of range, or the scene too large.
 
     Examples
     --------
@@ -103,6 +106,10 @@ def suggest(scene: Scene, error: float = 1e-2) -> Suggestion:
     rtol = float(np.clip((1.0 - MESH_SHARE) * wanted / ACHIEVED_OVER_ASKED, 1e-8, 0.1))
     errors = {"time step": ACHIEVED_OVER_ASKED * rtol}
     fluid, body = scene.fluid, immersed_body(scene)
+    if len(body.nodes) > MOST_NODES:
+        raise not_allowed(
+            "scene", f"{len(body.nodes)} immersed nodes", f"at most {MOST_NODES}: judge a part of it"
+        )
     if fluid is None or fluid.model == "none" or len(body.edges) == 0:
         length = float(np.mean(np.concatenate([rod.rest_lengths() for rod in scene.rods])))
         return Suggestion(
@@ -110,7 +117,8 @@ def suggest(scene: Scene, error: float = 1e-2) -> Suggestion:
         )
     errors |= fluid_errors(scene, fluid, body)
     present = _mean_edge(body)
-    needed = present * min(1.0, MESH_SHARE * wanted / errors["mesh"])
+    excess = errors["mesh"] / (MESH_SHARE * wanted)
+    needed = present / max(1.0, excess)
     return Suggestion(
         error=wanted,
         rtol=rtol,

@@ -77,6 +77,14 @@ impl Bodies {
         &self.radius
     }
 
+    /// Radius of the thinnest edge that can touch, m; of the thinnest body if no edge can.
+    pub fn thinnest(&self) -> f64 {
+        let least = |radius: &mut dyn Iterator<Item = f64>| radius.fold(f64::INFINITY, f64::min);
+        let edges = self.radius[..self.edge_count].iter().zip(&self.colliding);
+        let touching = least(&mut edges.filter(|(_, colliding)| **colliding).map(|(radius, _)| *radius));
+        if touching.is_finite() { touching } else { least(&mut self.radius.iter().copied()) }
+    }
+
     /// Whether a body can touch any other.
     pub fn colliding(&self) -> &[bool] {
         &self.colliding

@@ -16,7 +16,7 @@ use crate::Vec3;
 /// Default tolerance: rods act on each other between 0.95 and 1.05 of the sum of their radii.
 pub const DEFAULT_DELTA: f64 = 0.05;
 
-/// Default skin over the largest radius; only speed depends on it.
+/// Default skin over the radius of the thinnest edge that can touch; only speed depends on it.
 const SKIN_PER_RADIUS: f64 = 1.0;
 
 /// The constants of barrier contact.
@@ -102,18 +102,13 @@ impl BarrierLaw {
     pub fn new(bodies: Bodies, delta: f64, stiffness: f64) -> Self {
         assert!(delta > 0.0 && delta < 1.0, "the tolerance is between 0 and 1");
         assert!(stiffness > 0.0, "the stiffness is positive");
-        let skin = SKIN_PER_RADIUS * bodies.radius().iter().copied().fold(0.0, f64::max);
+        let skin = SKIN_PER_RADIUS * bodies.thinnest();
         Self { bodies, delta, stiffness, skin, friction: None }
     }
 
     /// Prescribes the skin of the list of near pairs, m.
     pub fn with_skin(self, skin: f64) -> Self {
         Self { skin, ..self }
-    }
-
-    /// The same law with another stiffness, Pa.
-    pub fn with_stiffness(self, stiffness: f64) -> Self {
-        Self { stiffness, ..self }
     }
 
     /// The same law with friction.
@@ -158,9 +153,8 @@ impl BarrierLaw {
         if state.candidates.anchor() == anchor {
             return false;
         }
-        state.candidates = Candidates::new(&self.bodies, self.delta, self.skin);
         state.lagged.clear();
-        state.candidates.ensure(&self.bodies, anchor);
+        state.candidates.list(&self.bodies, anchor);
         self.list_elements(state)
     }
 
@@ -277,17 +271,24 @@ impl BarrierLaw {
     }
 
     /// The pair whose surfaces are closest; `None` if no pair may touch.
-    pub fn smallest_gap(&self, state: &BarrierState, nodes: &[Vec3]) -> Option<Approach> {
+    pub fn smallest_gap(&self, state: &mut BarrierState, nodes: &[Vec3]) -> Option<Approach> {
         let listed = self.closest(state.candidates.pairs().iter().copied(), nodes);
         // A pair outside the list was further than the range and the skin when it was made.
-        let thinnest = 2.0 * self.bodies.radius().iter().copied().fold(f64::INFINITY, f64::min);
-        let known = self.delta * thinnest + 2.0 * state.candidates.spare(nodes);
+        let known = 2.0 * (self.delta * self.bodies.thinnest() + state.candidates.spare(nodes));
         if listed.is_some_and(|approach| approach.gap() <= known) {
             return listed;
         }
-        let count = self.bodies.radius().len();
-        let all = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b]));
-        self.closest(all.filter(|&[a, b]| self.bodies.may_touch(a, b)), nodes)
+        let size = nodes.iter().map(|node| (node - nodes[0]).norm()).fold(0.0, f64::max);
+        let mut margin = self.skin;
+        loop {
+            let near = state.candidates.within_margin(nodes, margin);
+            let found = self.closest(near.iter().map(|pair| pair.map(|body| body as usize)), nodes);
+            // Every pair closer than both margins is listed; no two nodes are further apart than twice the size.
+            if found.is_some_and(|approach| approach.gap() <= 2.0 * margin) || margin > 2.0 * size {
+                return found;
+            }
+            margin *= 2.0;
+        }
     }
 
     fn closest(&self, pairs: impl Iterator<Item = [usize; 2]>, nodes: &[Vec3]) -> Option<Approach> {
@@ -373,6 +374,12 @@ impl BarrierState {
     /// Distinct nodes of every element, in the order of its gradient and matrix.
     pub fn stencils(&self) -> impl Iterator<Item = &[usize]> {
         self.elements.iter().map(|element| &element.nodes[..element.count])
+    }
+
+    /// Distinct nodes of one element.
+    pub fn stencil(&self, element: usize) -> &[usize] {
+        let element = &self.elements[element];
+        &element.nodes[..element.count]
     }
 
     /// Where the list of near pairs was made, m.

@@ -76,19 +76,22 @@ impl ContactLaw {
 
     /// The smallest gap between surfaces of edges that may touch, m, and the pair; `None` if no pair may.
     pub fn smallest_gap(&self, nodes: &[Vec3]) -> Option<(f64, [usize; 2])> {
-        let mut smallest: Option<(f64, [usize; 2])> = None;
-        for a in 0..self.edges.len() {
-            for b in a + 1..self.edges.len() {
-                if !(self.colliding[a] && self.colliding[b]) || self.exclusion.excludes(a, b) {
-                    continue;
-                }
-                let gap = self.closest([a, b], nodes).distance - self.radius[a] - self.radius[b];
-                if smallest.is_none_or(|(least, _)| gap < least) {
-                    smallest = Some((gap, [a, b]));
-                }
-            }
-        }
-        smallest
+        let gap = |pair: [usize; 2]| self.closest(pair, nodes).distance - self.thickness(pair);
+        self.least(gap)
+    }
+
+    /// The distance of the centrelines, m, of the pair that overlaps most in sums of radii, and the pair.
+    pub fn deepest(&self, nodes: &[Vec3]) -> Option<(f64, [usize; 2])> {
+        let ratio = |pair: [usize; 2]| self.closest(pair, nodes).distance / self.thickness(pair);
+        self.least(ratio).map(|(ratio, pair)| (ratio * self.thickness(pair), pair))
+    }
+
+    fn least(&self, measure: impl Fn([usize; 2]) -> f64) -> Option<(f64, [usize; 2])> {
+        let count = self.edges.len();
+        let pairs = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b]));
+        let touching = |&[a, b]: &[usize; 2]| self.colliding[a] && self.colliding[b] && !self.exclusion.excludes(a, b);
+        let measured = pairs.filter(touching).map(|pair| (measure(pair), pair));
+        measured.min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 }
 

@@ -79,6 +79,11 @@ impl BarrierTerm {
         }
     }
 
+    /// How often all pairs have been searched for near ones.
+    pub fn searches(&self) -> u64 {
+        self.state.searches()
+    }
+
     /// Adds the gradient of the energy to `elastic`, and friction to `residual`.
     pub fn add_forces(
         &mut self,
@@ -90,9 +95,9 @@ impl BarrierTerm {
         residual: &mut [f64],
     ) {
         self.place(law, node_dofs, q);
-        let stencils: Vec<&[usize]> = self.state.stencils().collect();
+        let state = &self.state;
         let spread = |element: usize, gradient: &[f64], out: &mut [f64]| {
-            for (&node, part) in stencils[element].iter().zip(gradient.chunks_exact(3)) {
+            for (&node, part) in state.stencil(element).iter().zip(gradient.chunks_exact(3)) {
                 (0..3).for_each(|c| out[node_dofs[node] + c] += part[c]);
             }
         };
@@ -163,6 +168,6 @@ impl BarrierTerm {
     /// The pair whose surfaces are closest at these degrees of freedom.
     pub fn closest(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) -> Option<Approach> {
         self.place(law, node_dofs, q);
-        law.smallest_gap(&self.state, &self.nodes)
+        law.smallest_gap(&mut self.state, &self.nodes)
     }
 }

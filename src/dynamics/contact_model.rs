@@ -88,10 +88,9 @@ impl ContactModel {
     pub fn overlap(&self, nodes: &[Vec3]) -> Option<Overlap> {
         match self {
             Self::SpillmannTeschner(law) => {
-                let (gap, [a, b]) = law.smallest_gap(nodes)?;
+                let (distance, [a, b]) = law.deepest(nodes)?;
                 let thickness = law.thickness([a, b]);
                 let allowed = (1.0 - law.tolerance()) * thickness;
-                let distance = thickness + gap;
                 let bodies = [Body::Edge(a), Body::Edge(b)];
                 (distance < allowed).then_some(Overlap { bodies, distance, allowed })
             }

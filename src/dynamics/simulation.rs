@@ -210,6 +210,7 @@ impl Simulation {
         state.density.fill(0.0);
         state.tensions.fill(0.0);
         state.contact_anchor.clear();
+        state.contacts.clear();
         state.control = Control::default();
         rebase(&mut state.frames, network.edges(), nodes);
         if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
@@ -461,6 +462,7 @@ impl Simulation {
             state.contacts = forces.iter().map(|force| (force.indices(law), force.force.norm())).collect();
             state.contact_anchor.clear();
             state.contact_anchor.extend_from_slice(barrier.anchor());
+            self.statistics.contact_searches = barrier.searches();
         }
         self.statistics.steps += 1;
     }

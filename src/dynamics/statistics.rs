@@ -15,6 +15,8 @@ pub struct Statistics {
     pub dense_solves: u64,
     /// Passes of the contact loop.
     pub contact_iterations: u64,
+    /// Searches of all pairs for near ones, by barrier contact.
+    pub contact_searches: u64,
     /// Seconds spent on the fluid's matrix: assembly and factorization.
     pub seconds_fluid: f64,
     /// Seconds spent on residuals and derivatives.

@@ -39,11 +39,6 @@ impl NearlySymmetric {
         })
     }
 
-    /// The pattern.
-    pub fn pattern(&self) -> &Pattern {
-        &self.pattern
-    }
-
     /// The matrix on the pattern, to be filled before [`Self::factor`].
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
@@ -83,8 +78,7 @@ impl NearlySymmetric {
         }
     }
 
-    /// Solves `K x = rhs` and looks at the residual; where it is too large, refines the solution, and if that does not help
-    /// factors anew with pivoting and solves again.
+    /// Solves `K x = rhs` and looks at the residual; where it is too large, factors anew with pivoting and solves again.
     ///
     /// # Errors
     /// As [`Self::factor`] and [`Self::solve`].
@@ -94,14 +88,25 @@ impl NearlySymmetric {
         if self.pivoted {
             return solved;
         }
-        let trusted = TRUSTED * size(rhs);
-        if solved.is_ok() && (self.miss(rhs, x) <= trusted || (self.refine(x).is_ok() && self.miss(rhs, x) <= trusted))
-        {
+        if solved.is_ok() && self.miss(rhs, x) <= TRUSTED * size(rhs) {
             return Ok(());
         }
         self.factor_with_pivoting()?;
         x.copy_from_slice(rhs);
         self.solve(x)
+    }
+
+    /// As [`Self::solve_checked`], for a solution of which only the size is wanted: refined where it is not good enough, before
+    /// the matrix is factored with pivoting.
+    ///
+    /// # Errors
+    /// As [`Self::solve_checked`].
+    pub fn solve_roughly(&mut self, rhs: &[f64], x: &mut [f64]) -> Result<(), LinearError> {
+        x.copy_from_slice(rhs);
+        let trusted = TRUSTED * size(rhs);
+        let solved = self.solve(x).is_ok()
+            && (self.miss(rhs, x) <= trusted || (self.refine(x).is_ok() && self.miss(rhs, x) <= trusted));
+        if solved { Ok(()) } else { self.solve_checked(rhs, x) }
     }
 
     /// As [`Self::solve_checked`], with a step of iterative refinement for the part of the matrix that is not symmetric.

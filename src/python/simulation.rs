@@ -69,7 +69,7 @@ impl Simulation {
         })
     }
 
-    /// Local error (m) that adaptive steps keep to, and the relative residual they are solved to; fixed steps without.
+    /// Local error (m) that adaptive steps keep to; fixed steps without.
     #[pyo3(signature = (tolerance=None))]
     fn set_tolerance(&mut self, tolerance: Option<f64>) {
         self.inner.set_tolerance(tolerance);
@@ -265,6 +265,7 @@ impl Simulation {
         out.set_item("krylov_iterations", statistics.krylov_iterations)?;
         out.set_item("dense_solves", statistics.dense_solves)?;
         out.set_item("contact_iterations", statistics.contact_iterations)?;
+        out.set_item("contact_searches", statistics.contact_searches)?;
         out.set_item("seconds_fluid", statistics.seconds_fluid)?;
         out.set_item("seconds_assembly", statistics.seconds_assembly)?;
         out.set_item("seconds_linear", statistics.seconds_linear)?;

@@ -135,8 +135,8 @@ def test_rods_driven_through_each_other_never_cross(dt: float, options: dict[str
                     simulation.step()
                     assert watch.closest() >= LEAST
             except ConvergenceError:
-                # Only where a step stretches the rods to many times their length.
-                assert speed * dt >= 0.1
+                # Only where a fixed step stretches the rods to many times their length.
+                assert speed * dt >= 0.1 and dt >= 0.1 and not options
             assert watch.closest() >= LEAST
             upper, lower = simulation.nodes[8:10], simulation.nodes[2:4]
             assert upper[:, 2].min() > lower[:, 2].max()

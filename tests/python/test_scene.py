@@ -495,7 +495,7 @@ def full_scene() -> Scene:
         motors=[Motor(node=2, shaft=2, torque=Table(times=[0.0, third], values=[third, 2.0]))],
         clamps=[Clamp(rod=1, nodes=(0,), edges=(0,), angular_velocity=third)],
         loads=[PointLoad(rod=1, node=2, force=(third, 0.0, -1.0))],
-        contact=Contact(exclusion_factor=third),
+        contact=Contact(exclusion_factor=1.0 + third),
         gravity=(0.0, 0.0, -9.81),
         name="everything",
     )

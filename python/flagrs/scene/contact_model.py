@@ -37,7 +37,8 @@ class Contact(Part):
         right.
     tolerance : float or None
         ``barrier``: contact acts where centrelines are between ``1 - tolerance`` and ``1 + tolerance`` times
-        the sum of the two radii apart, and they never come closer than the former. ``spillmann-teschner``:
+        the sum of the two radii apart, and no accepted step has them closer than the former (saved frames
+        between adaptive steps are interpolated, to `rtol`). ``spillmann-teschner``:
         penetration that may remain, as a fraction of that sum. None: 0.05 and 0.01.
     friction : float
         Coefficient of Coulomb friction; ``barrier`` only.
@@ -74,6 +75,10 @@ class Contact(Part):
                 raise not_allowed(
                     "tolerance", self.tolerance, f"at most {WIDEST:g} if the method is 'barrier'"
                 )
+            needed = 1.0 + self.tolerance_or_default()
+            if self.exclusion_factor is not None and self.exclusion_factor < needed:
+                allowed = f"at least 1 + tolerance = {needed:g}, or straight rods push themselves"
+                raise not_allowed("exclusion_factor", self.exclusion_factor, allowed)
             return self
         if self.friction > 0.0:
             raise not_allowed("friction", self.friction, "0 unless the method is 'barrier'")
