@@ -43,8 +43,8 @@ class History:
         Smallest gap (K,) over all accepted steps of each interval, over the diameter.
     contacts, newton, rejected : ndarray
         Pairs that push (K,) at the end; Newton iterations per step; rejected steps.
-    seconds : float
-        Wall time [s].
+    simulated, seconds : float
+        Simulated and wall time [s].
     counts : dict
         Statistics of the simulation.
     """
@@ -53,6 +53,7 @@ class History:
     contacts: NDArray[np.float64]
     newton: NDArray[np.float64]
     rejected: NDArray[np.float64]
+    simulated: float
     seconds: float
     counts: dict[str, float]
 
@@ -75,7 +76,7 @@ def long_run(count: int, until: float) -> History:
         rows.append((gap / (2.0 * RADIUS), contacts, newton, made["rejected_steps"]))
     seconds = time.perf_counter() - begun
     columns = np.array(rows).T
-    return History(*columns, seconds=seconds, counts=before)
+    return History(*columns, simulated=simulation.time, seconds=seconds, counts=before)
 
 
 def long_runs(runs: dict[int, History]) -> str:
@@ -96,7 +97,7 @@ def long_runs(runs: dict[int, History]) -> str:
     )
     rows = []
     for count, run in runs.items():
-        simulated = EVERY * len(run.gap)
+        simulated = run.simulated
         steps = run.counts["steps"]
         rows.append(
             [

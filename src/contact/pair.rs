@@ -217,7 +217,7 @@ impl Pair {
         offer(closest, 1.0, 0.0);
         let [p, q] = self.shares;
         let quarters = self.rest_lengths.map_or([0.0; 2], |lengths| lengths.map(|length| 0.25 * length));
-        // A share vanishes at the end of a rod, and so do both factors of a sphere's node.
+        // Shares vanish at the ends of rods, and both shares and quarters at spheres.
         for v in 0..2 {
             if p[v] != 0.0 || quarters[0] != 0.0 {
                 offer(Separation::of_end_of_a(x, v), -p[v], quarters[0]);
@@ -230,8 +230,9 @@ impl Pair {
         }
         for v in 0..2 {
             for w in 0..2 {
-                if p[v] != 0.0 || q[w] != 0.0 {
-                    offer(Separation::of_ends(x, v, w), p[v] * q[w], -quarters[0] * q[w] - quarters[1] * p[v]);
+                let (point, line) = (p[v] * q[w], -quarters[0] * q[w] - quarters[1] * p[v]);
+                if point != 0.0 || line != 0.0 {
+                    offer(Separation::of_ends(x, v, w), point, line);
                 }
             }
         }

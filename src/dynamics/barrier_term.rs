@@ -116,16 +116,16 @@ impl BarrierTerm {
         self.bound
     }
 
-    /// Degrees of freedom of all elements.
-    pub fn stencils(&mut self, node_dofs: &[usize]) -> &[Vec<usize>] {
+    /// First degree of freedom of every node of all elements.
+    pub fn blocks(&self, node_dofs: &[usize]) -> Vec<Vec<usize>> {
+        self.state.stencils().map(|nodes| nodes.iter().map(|&node| node_dofs[node]).collect()).collect()
+    }
+
+    /// Looks up the storage of all elements.
+    pub fn bind(&mut self, node_dofs: &[usize], pattern: &Pattern) {
         self.stencils.clear();
         let dofs = |nodes: &[usize]| nodes.iter().flat_map(|&n| node_dofs[n]..node_dofs[n] + 3).collect();
         self.stencils.extend(self.state.stencils().map(dofs));
-        &self.stencils
-    }
-
-    /// Looks up the storage of all elements of the last [`Self::stencils`].
-    pub fn bind(&mut self, pattern: &Pattern) {
         self.slots.clear();
         self.slots.extend(self.stencils.iter().map(|stencil| pattern.element_slots(stencil)));
         self.bound = true;

@@ -76,9 +76,10 @@ impl Balance {
     fn fill_system(&mut self, model: &Model, rate: f64) -> Result<(), LinearError> {
         let contact = model.barrier().zip(self.barrier.as_mut());
         if let Some((_, barrier)) = contact.filter(|(_, barrier)| !barrier.is_bound()) {
-            let stencils = barrier.stencils(model.network.node_dofs());
-            let (pattern, embedding) = model.pattern.extended(stencils.iter().map(Vec::as_slice));
-            barrier.bind(&pattern);
+            let node_dofs = model.network.node_dofs();
+            let blocks = barrier.blocks(node_dofs);
+            let (pattern, embedding) = model.pattern.extended(blocks.iter().map(Vec::as_slice));
+            barrier.bind(node_dofs, &pattern);
             self.system = NearlySymmetric::new(pattern)?;
             self.embedding = embedding;
         }

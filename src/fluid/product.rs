@@ -11,7 +11,7 @@ use crate::linear::dense::{DenseLu, multiply};
 use crate::linear::krylov::{Gmres, LinearOperator};
 
 /// Memory for the exact blocks of close pairs, bytes; those that do not fit are computed anew in every product.
-const BLOCK_MEMORY: usize = 2 << 30;
+pub const BLOCK_MEMORY: usize = 2 << 30;
 
 /// GMRES iterations in which the mobility must be inverted; the local drag as preconditioner leaves a few tens.
 const KRYLOV_LIMIT: usize = 200;
@@ -25,17 +25,7 @@ pub struct FarFieldChoice {
     pub error: f64,
 }
 
-impl Default for FarFieldChoice {
-    /// From [`FarFieldChoice::CROSSOVER`] nodes on, to an error that is lost in that of the segments themselves.
-    fn default() -> Self {
-        Self { from: Self::CROSSOVER, error: 1e-6 }
-    }
-}
-
 impl FarFieldChoice {
-    /// Immersed nodes from which on a step takes less time without the matrix (docs/performance.md).
-    pub const CROSSOVER: usize = 500;
-
     /// The matrix, whatever its size.
     pub const NEVER: Self = Self { from: usize::MAX, error: 1e-6 };
 }

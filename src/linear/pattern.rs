@@ -78,13 +78,20 @@ impl Pattern {
         self.row_indices[range.clone()].binary_search(&row).ok().map(|k| range.start + k)
     }
 
-    /// This pattern and dense blocks over further stencils; and where each of its own entries is stored there.
+    /// This pattern and dense blocks over further stencils, each given by the first of every three degrees of freedom in a row;
+    /// and where each of its own entries is stored there.
     pub fn extended<'a>(&self, stencils: impl Iterator<Item = &'a [usize]>) -> (Self, Vec<u32>) {
-        let mut further: Vec<(usize, usize)> = stencils
+        let mut blocks: Vec<(usize, usize)> = stencils
             .flat_map(|stencil| stencil.iter().flat_map(move |&column| stencil.iter().map(move |&row| (column, row))))
             .collect();
-        further.sort_unstable();
-        further.dedup();
+        blocks.sort_unstable();
+        blocks.dedup();
+        let mut further = Vec::with_capacity(9 * blocks.len());
+        for column_blocks in blocks.chunk_by(|(a, _), (b, _)| a == b) {
+            for column in column_blocks[0].0..column_blocks[0].0 + 3 {
+                further.extend(column_blocks.iter().flat_map(|&(_, row)| (row..row + 3).map(move |row| (column, row))));
+            }
+        }
         let mut extended = Self { size: self.size, column_starts: vec![0], row_indices: Vec::new() };
         let mut embedding = Vec::with_capacity(self.entries());
         let mut next = further.into_iter().peekable();

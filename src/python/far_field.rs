@@ -10,9 +10,7 @@ use super::arrays::{from_flat, pairs, points, values};
 use super::errors::{far_field_error, scene_error};
 use crate::dynamics::threads;
 use crate::fluid::far_field::FarField;
-
-/// Memory for the exact blocks of close pairs, bytes.
-const BLOCK_MEMORY: usize = 2 << 30;
+use crate::fluid::product::BLOCK_MEMORY;
 
 /// `8 pi mu u = A f` for given segments and targets.
 #[pyclass]

@@ -120,7 +120,7 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
             viscosity: substance.viscosity,
             model: FluidModelSpecification::StokesletSegments {
                 epsilon: vec![substance.epsilon; e],
-                far_field: FarFieldChoice::default(),
+                far_field: FarFieldChoice::NEVER,
             },
             immersed: vec![true; e],
             twist_drag: true,
