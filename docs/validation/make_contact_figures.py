@@ -32,6 +32,7 @@ from contact_cases import (  # noqa: E402
     incline_velocity,
     linking_numbers,
     ring_pairs,
+    settled_heap,
     weight,
 )
 
@@ -281,13 +282,7 @@ def shapes() -> None:
 def piles() -> None:
     """A heap of ten rods: weight borne, least distance."""
     scene = heap()
-    simulation = Simulation(scene, dt=2e-3, threads=1)
-    watch = Watch(simulation)
-    while simulation.time < 30.0:
-        simulation.step()
-        if simulation.time > 1.0:
-            simulation.dt = min(1.05 * simulation.dt, 0.5)
-        watch.closest()
+    simulation, watch = settled_heap(scene)
     total = sum(weight(rod) for rod in scene.rods[:10])
     pairs, forces, _ = contact_forces(simulation)
     borne = forces[(pairs[:, 0] < 60) & (pairs[:, 1] >= 60)].sum(axis=0)

@@ -17,6 +17,7 @@ from flagrs.assemble import edges_of, native_scene
 from flagrs.errors import SceneError, not_allowed
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
+from flagrs.scene.scene import check_scene
 from flagrs.scene.shapes import number, whole
 from flagrs.scene.values import Bounds, FloatArray, IntArray
 from flagrs.threads import thread_count
@@ -85,13 +86,7 @@ class Simulation:
         rtol: float | None = None,
         threads: int | None = None,
     ) -> None:
-        if not isinstance(scene, Scene):
-            raise SceneError(
-                f"scene: {type(scene).__name__} is not allowed; must be a flagrs.Scene",
-                field="scene",
-                value=scene,
-                allowed="a flagrs.Scene",
-            )
+        check_scene(scene)
         if rtol is not None:
             number("rtol", rtol, Bounds("1", at_least=1e-8, at_most=0.1))
         if rtol is not None and scheme == "explicit":

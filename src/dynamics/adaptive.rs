@@ -3,8 +3,9 @@
 use std::time::Instant;
 
 use super::control::Control;
+use super::failure::{StepError, TryError};
 use super::newton::{Goal, NewtonSettings};
-use super::simulation::{Simulation, StepError, TryError};
+use super::simulation::Simulation;
 use super::state::State;
 use crate::elastic::motors::Drive;
 

@@ -9,6 +9,7 @@
 //! * [`contact_model`]: how rods are kept apart; `barrier_term`: the barrier in a step's equations.
 //! * [`control`]: the size and order of adaptive steps.
 //! * [`newton`]: Newton's method with line search on that balance.
+//! * [`failure`]: what can go wrong with a step.
 //! * [`predictor`]: past states: guesses, backward differences, dense output.
 //! * [`scheme`]: which terms a time-stepping scheme keeps and how it treats the fluid.
 //! * [`simulation`]: steps, retries, acceptance.
@@ -21,6 +22,7 @@ mod barrier_term;
 pub mod contact_model;
 pub mod control;
 pub mod diagnostics;
+pub mod failure;
 pub mod model;
 pub mod newton;
 pub mod predictor;

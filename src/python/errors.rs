@@ -3,8 +3,8 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::dynamics::failure::StepError;
 use crate::dynamics::model::ModelError;
-use crate::dynamics::simulation::StepError;
 use crate::fluid::far_field::{FarFieldError, LARGEST_TOLERANCE, SMALLEST_TOLERANCE};
 use crate::linear::LinearError;
 

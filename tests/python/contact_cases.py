@@ -476,6 +476,18 @@ def heap(count: int = 10, friction: float = 0.0, seed: int = 1) -> Scene:
     )
 
 
+def settled_heap(scene: Scene) -> tuple[Simulation, Watch]:
+    """Return the heap after 30 s, at rest, and what was watched at every step."""
+    simulation = Simulation(scene, dt=2e-3, threads=1)
+    watch = Watch(simulation)
+    while simulation.time < 30.0:
+        simulation.step()
+        if simulation.time > 1.0:
+            simulation.dt = min(1.05 * simulation.dt, 0.5)
+        watch.closest()
+    return simulation, watch
+
+
 def weight(rod: Rod) -> float:
     """Return the weight of a rod of constant radius [N]."""
     return float(

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, PlainValidator, field_validator, model_validator
 
-from flagrs.errors import combined, faulty
+from flagrs.errors import SceneError, combined, faulty
 from flagrs.scene import codec, scene_checks
 from flagrs.scene.clamp import Clamp
 from flagrs.scene.contact_model import Contact
@@ -153,3 +153,14 @@ class Scene(Part):
         from flagrs.scene import toml  # toml reads scenes, so it is above this module
 
         return toml.read(Path(path))
+
+
+def check_scene(scene: object) -> None:
+    """Raise SceneError unless it is a scene."""
+    if not isinstance(scene, Scene):
+        raise SceneError(
+            f"scene: {type(scene).__name__} is not allowed; must be a flagrs.Scene",
+            field="scene",
+            value=scene,
+            allowed="a flagrs.Scene",
+        )
