@@ -1,4 +1,4 @@
-"""Bundles of clamped flagella in contact: time of long runs, two methods side by side, speed against error.
+"""Bundles of clamped flagella in contact, and robots: time of long runs, gaps, contacts, iterations over time.
 
 Run ``python benches/python/bundles.py [--document docs/performance.md]``; about ten minutes.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import flagrs
 import numpy as np
@@ -21,16 +20,14 @@ FIGURE = Path(__file__).parents[2] / "docs" / "images" / "bundles.png"
 #: Simulated time of the published runs [s], and their wall time by number of flagella [h].
 PUBLISHED_TIME = 250.0
 PUBLISHED = {2: 0.57, 3: 1.19, 5: 3.34, 10: 22.8}
-#: Radius of the filaments [m]; helix radius, the size that errors refer to [m].
-RADIUS, HELIX_RADIUS = 1e-3, 10e-3
+#: Radius of the filaments [m].
+RADIUS = 1e-3
 #: Simulated time of the robots [s].
 ROBOT_TIME = 100.0
 #: Error asked for in the long runs.
 RTOL = 1e-2
 #: Time between rows of the figure [s].
 EVERY = 0.5
-#: Simulated time of the comparisons [s]: the flagella meet at about 2.6 s and are wrapped from 8 s on.
-COMPARED_TIME = 9.0
 
 
 @dataclass(frozen=True)
@@ -155,98 +152,6 @@ def robots() -> str:
     return table(head, rows)
 
 
-@dataclass(frozen=True)
-class Measures:
-    """Two flagella in contact: nodes, distance of the tips [m] and sum of contact forces [N] over time."""
-
-    nodes: NDArray[np.float64]
-    tips: NDArray[np.float64]
-    force: NDArray[np.float64]
-    gap: float
-    seconds: float
-    counts: dict[str, float]
-
-
-def bundle(contact: dict[str, Any], **options: Any) -> Measures:
-    scene = flagrs.scenarios.clamped_flagella(count=2, contact=contact)
-    simulation = flagrs.Simulation(scene, threads=1, **options)
-    nodes, force, gap = [], [], np.inf
-    # Rejected guesses aside, every accepted step is seen: the gap is that of all of them.
-    for frame in np.arange(1, round(COMPARED_TIME / 0.1) + 1):
-        simulation.run(0.1 * frame, 0.1, path=False)
-        gap = min(gap, simulation.minimum_gap)
-        nodes.append(simulation.nodes)
-        force.append(float(simulation.contact_forces()[1].sum()))
-    found = np.array(nodes)
-    tips = np.linalg.norm(found[:, 67] - found[:, 135], axis=1)
-    counts = simulation.statistics
-    return Measures(found, tips, np.array(force), gap / (2.0 * RADIUS), counts["seconds_total"], counts)
-
-
-def mean_force(measures: Measures) -> float:
-    """Return the mean over the second half of the frames [N]."""
-    return float(measures.force[len(measures.force) // 2 :].mean())
-
-
-METHODS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-    "barrier, rtol 1e-1": ({}, {"rtol": 1e-1}),
-    "barrier, rtol 1e-2": ({}, {"rtol": 1e-2}),
-    "barrier, rtol 1e-3": ({}, {"rtol": 1e-3}),
-    "barrier, rtol 1e-4": ({}, {"rtol": 1e-4}),
-    "barrier, tolerance 0.1, rtol 1e-3": ({"tolerance": 0.1}, {"rtol": 1e-3}),
-    "barrier, tolerance 0.02, rtol 1e-3": ({"tolerance": 0.02}, {"rtol": 1e-3}),
-    "barrier, dt 3.3 ms": ({}, {}),
-    "Spillmann-Teschner, rtol 1e-2": ({"method": "spillmann-teschner"}, {"rtol": 1e-2}),
-    "Spillmann-Teschner, rtol 1e-3": ({"method": "spillmann-teschner"}, {"rtol": 1e-3}),
-    "Spillmann-Teschner, dt 3.3 ms": ({"method": "spillmann-teschner"}, {}),
-    "Spillmann-Teschner, explicit, dt 1 ms": (
-        {"method": "spillmann-teschner"},
-        {"scheme": "explicit", "dt": 1e-3},
-    ),
-}
-
-
-def comparison() -> str:
-    reference, check = bundle({}, rtol=1e-5), bundle({}, rtol=1e-4)
-    rows = []
-    for name, (contact, options) in METHODS.items():
-        found = bundle(contact, **options)
-        apart = np.linalg.norm(found.nodes - reference.nodes, axis=2).max() / HELIX_RADIUS
-        tips = np.abs(found.tips - reference.tips).max() / HELIX_RADIUS
-        rows.append(
-            [
-                name,
-                f"{apart:.1e}",
-                f"{tips:.1e}",
-                f"{1e3 * mean_force(found):.2f}",
-                f"{found.gap:+.4f}",
-                f"{1e3 * found.seconds / COMPARED_TIME:.0f}",
-                f"{found.counts['steps']:.0f}",
-                f"{found.counts['newton_iterations']:.0f}",
-                f"{found.counts['contact_iterations']:.0f}",
-                f"{found.counts['rejected_steps']:.0f}",
-            ]
-        )
-    head = (
-        f"two flagella, {COMPARED_TIME:g} s",
-        "error of nodes",
-        "of tip distance",
-        "mean force [mN]",
-        "smallest gap / 2r",
-        "ms per simulated s",
-        "steps",
-        "Newton",
-        "passes",
-        "rejected",
-    )
-    own = np.linalg.norm(reference.nodes - check.nodes, axis=2).max() / HELIX_RADIUS
-    return (
-        f"{table(head, rows)}\n\nErrors are the largest at any of the frames, 0.1 s apart, over the helix "
-        f"radius, against the barrier (tolerance 0.05) at rtol 1e-5, which moves by {own:.0e} from rtol "
-        f"1e-4; its mean force is {1e3 * mean_force(reference):.2f} mN. Gaps are those of the frames."
-    )
-
-
 def draw(runs: dict[int, History]) -> None:
     figure = new_figure(9.0, 8.0)
     axes = figure.subplots(4, 1, sharex=True)
@@ -268,14 +173,12 @@ def draw(runs: dict[int, History]) -> None:
 def main() -> None:
     hold_to_one_thread()
     document = document_option(__doc__ or "")
-    compared = comparison()
-    print(compared, flush=True)
     runs = {}
     for count in PUBLISHED:
         runs[count] = long_run(count, PUBLISHED_TIME if count < 10 else 40.0)
         print(count, runs[count].seconds, flush=True)
     draw(runs)
-    publish("bundles", f"{machine('numpy')}\n\n{long_runs(runs)}\n\n{robots()}\n\n{compared}", document)
+    publish("bundles", f"{machine('numpy')}\n\n{long_runs(runs)}\n\n{robots()}", document)
 
 
 if __name__ == "__main__":
