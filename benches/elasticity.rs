@@ -78,8 +78,15 @@ impl Chain {
 
     fn derive(&mut self, with_hessian: bool) {
         self.place();
-        let increment =
-            Increment { rate: 1.0, previous: &self.q, drift: &self.q, velocity: &self.q, velocity_drift: &self.q };
+        let increment = Increment {
+            rate: 1.0,
+            previous: &self.q,
+            drift: &self.q,
+            velocity: &self.q,
+            velocity_drift: &self.q,
+            inputs: &[],
+            background: None,
+        };
         self.gradient.fill(0.0);
         let mut jacobian = None;
         if with_hessian {

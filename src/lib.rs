@@ -16,14 +16,15 @@
 //! # The map
 //!
 //! * [`rod`]: networks, frames, strains; [`elastic`]: energies and motors; [`fluid`]: drag models and the head;
-//!   [`contact`]: distances and contact forces; [`dynamics`]: model, state, schemes, Newton; [`linear`]: matrices.
-//! * Imports run one way: `rod <- elastic, fluid, contact <- dynamics <- python`; `linear` knows nothing of rods.
+//!   [`forces`]: loads and fields; [`contact`]: distances and contact forces; [`dynamics`]: model, state, schemes, Newton; [`linear`]: matrices.
+//! * Imports run one way: `rod <- elastic, fluid, forces, contact <- dynamics <- python`; `linear` knows nothing of rods.
 //! * [`dynamics::simulation::Simulation`] is the way in.
 
 pub mod contact;
 pub mod dynamics;
 pub mod elastic;
 pub mod fluid;
+pub mod forces;
 pub mod linear;
 #[cfg(feature = "python")]
 mod python;

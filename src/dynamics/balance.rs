@@ -22,6 +22,7 @@ use super::state::State;
 use super::statistics::Statistics;
 use crate::elastic::motors::Drive;
 use crate::fluid::FluidModel;
+use crate::fluid::ambient::Ambient;
 use crate::linear::LinearError;
 use crate::linear::krylov::Gmres;
 use crate::linear::nearly_symmetric::NearlySymmetric;
@@ -31,6 +32,19 @@ use crate::{Mat3, Vec3};
 
 /// GMRES iterations before the dense fallback; far above what a good preconditioner needs.
 const KRYLOV_LIMIT: usize = 120;
+
+/// What drives a step, at its end.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Drives {
+    /// Angles of speed-driven motors, rad.
+    pub motor_angles: Vec<f64>,
+    /// Torques of torque-driven motors, N m.
+    pub motor_torques: Vec<f64>,
+    /// Values of the loads' signals.
+    pub inputs: Vec<f64>,
+    /// The background flow, where the fluid's geometry is taken.
+    pub ambient: Option<Ambient>,
+}
 
 /// What is given for a step: its length, scheme, and what motors do by its end.
 pub(super) struct Step<'a> {
@@ -44,17 +58,16 @@ pub(super) struct Step<'a> {
     pub rate: f64,
     pub drift: Vec<f64>,
     pub velocity_drift: Vec<f64>,
+    /// Values of the loads' signals at the end of the step.
+    pub inputs: Vec<f64>,
+    /// The background flow at the end of the step, where the fluid's geometry is taken.
+    pub ambient: Option<Ambient>,
 }
 
 impl<'a> Step<'a> {
     /// A step of the given order, which at most is one more than there are past states.
-    pub fn new(
-        scheme: Scheme,
-        state: &'a State,
-        dt: f64,
-        order: usize,
-        (motor_angles, motor_torques): (Vec<f64>, Vec<f64>),
-    ) -> Self {
+    pub fn new(scheme: Scheme, state: &'a State, dt: f64, order: usize, drives: Drives) -> Self {
+        let Drives { motor_angles, motor_torques, inputs, ambient } = drives;
         let past = &state.history.past;
         let times: Vec<f64> = std::iter::once(state.time + dt).chain(state.history.times(state.time, order)).collect();
         let weights = derivative_weights(&times);
@@ -73,11 +86,15 @@ impl<'a> Step<'a> {
             rate: weights[0],
             drift: difference(&state.q, &|k| &past[k].q),
             velocity_drift: difference(&state.velocity, &|k| &past[k].velocity),
+            inputs,
+            ambient,
         }
     }
 
     pub fn increment(&self) -> Increment<'_> {
         Increment {
+            inputs: &self.inputs,
+            background: self.ambient.as_ref().map(Ambient::background),
             rate: self.rate,
             previous: &self.state.q,
             drift: &self.drift,
@@ -236,6 +253,7 @@ impl Balance {
         self.constant.fill(0.0);
         if let Some(fluid) = self.fluid.as_mut().filter(|_| !step.scheme.fluid_is_implicit()) {
             gather(&self.fluid_dofs, |dof| step.state.velocity[dof], &mut self.flow);
+            subtract_background(step, fluid.immersed(), &mut self.flow);
             fluid.resist(&mut self.flow, self.pool.as_deref())?;
             scatter(&self.fluid_dofs, &self.flow, &mut self.constant);
         }
@@ -356,6 +374,7 @@ impl Balance {
         let Some(fluid) = self.fluid.as_mut().filter(|_| step.scheme.fluid_is_implicit()) else { return Some(()) };
         let (increment, pool) = (step.increment(), self.pool.as_deref());
         gather(&self.fluid_dofs, |dof| increment.rate_of(dof, trial.q[dof]), &mut self.flow);
+        subtract_background(step, fluid.immersed(), &mut self.flow);
         match fluid.nonlocal() {
             None => fluid.resist(&mut self.flow, pool).ok()?,
             Some(mobility) => {
@@ -437,6 +456,8 @@ impl Balance {
                 drift: &state.velocity,
                 velocity: &state.velocity,
                 velocity_drift: &state.velocity,
+                inputs: &[],
+                background: None,
             };
             let mut out = Assembly { residual: &mut gradient, jacobian: Some(&mut hessian) };
             model.stretching.add(&self.configuration, &increment, &mut out);
@@ -456,6 +477,15 @@ impl Balance {
                 model.hinges.twisting_energy(&self.configuration),
             ]
         })
+    }
+}
+
+/// Makes velocities of immersed nodes those relative to the background flow.
+fn subtract_background(step: &Step, immersed: &[usize], flow: &mut [f64]) {
+    let Some(ambient) = &step.ambient else { return };
+    let velocities = ambient.background().node_velocities;
+    for (&node, flow) in immersed.iter().zip(flow.chunks_exact_mut(3)) {
+        (0..3).for_each(|c| flow[c] -= velocities[node][c]);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::contact_model::{ContactModel, Overlap};
 use super::control::Control;
 use super::predictor::History;
-use super::specification::{FluidModelSpecification, Specification};
+use super::specification::{FlowSpecification, FluidModelSpecification, Frame, LoadKind, Specification};
 use super::state::State;
 use super::terms::{Inertia, Loads};
 use crate::Vec3;
@@ -14,11 +14,16 @@ use crate::elastic::motors::{Drive, Motor};
 use crate::elastic::stretching::Stretching;
 use crate::elastic::twisting::Twisting;
 use crate::fluid::FluidModel;
+use crate::fluid::ambient::AmbientFlow;
 use crate::fluid::head::Head;
 use crate::fluid::product::FarFieldChoice;
 use crate::fluid::rft::ResistiveForce;
 use crate::fluid::rss::StokesletSegments;
 use crate::fluid::twist_drag::TwistDrag;
+use crate::forces::follower::{FollowerForce, FollowerTorque};
+use crate::forces::inputs::Inputs;
+use crate::forces::laboratory::{EdgeTorque, NodeForce};
+use crate::forces::magnetic::Magnetism;
 use crate::linear::LinearError;
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{HingeElement, Term};
@@ -94,6 +99,8 @@ pub struct Model {
     pub(super) bending_scale: f64,
     pub(super) shortest_edge: f64,
     pub(super) contact: Option<ContactModel>,
+    pub(super) inputs: Inputs,
+    pub(super) flows: Vec<Box<dyn AmbientFlow>>,
     pub(super) specification: Specification,
 }
 
@@ -120,6 +127,8 @@ impl Model {
         let mass = masses(&specification, &network, dof_count, &rest.lengths);
         let mut inertia = Inertia::new(mass.clone());
         let mut dissipative = dissipative_terms(&specification, &network, dof_count, &rest.lengths);
+        let mut inputs = Inputs::default();
+        dissipative.extend(load_terms(&specification, &network, &rest.lengths, &mut inputs));
         let mut stencils: Vec<Vec<usize>> = stretching.stencils();
         stencils.extend(hinges.stencils());
         stencils.extend(dissipative.iter().flat_map(|term| term.stencils()));
@@ -158,6 +167,8 @@ impl Model {
             shortest_edge: rest.lengths.iter().copied().fold(f64::INFINITY, f64::min),
             contact,
             network,
+            inputs,
+            flows: specification.flows.iter().map(FlowSpecification::flow).collect(),
             specification,
         };
         let mut configuration = Configuration::new(&model.network, model.dof_count);
@@ -485,4 +496,56 @@ fn clamps(specification: &Specification, network: &Network, dof_count: usize) ->
         })
         .collect();
     (clamps, prescribed)
+}
+
+/// Terms of loads that follow signals.
+fn load_terms(
+    specification: &Specification,
+    network: &Network,
+    lengths: &[f64],
+    inputs: &mut Inputs,
+) -> Vec<Box<dyn Term>> {
+    let mut terms: Vec<Box<dyn Term>> = Vec::new();
+    for load in &specification.signal_loads {
+        let channels = inputs.add_vector(load.signal.clone());
+        // Per length: half of an edge's share goes to each of its nodes.
+        let halves = |edge: usize| (edge, [0.5 * lengths[edge]; 2]);
+        let whole = |edge: usize| (edge, lengths[edge]);
+        let term: Box<dyn Term> = match (&load.kind, load.frame) {
+            (LoadKind::NodeForce { node, .. }, Frame::Laboratory) => {
+                Box::new(NodeForce::new(network, &[(*node, 1.0)], channels))
+            }
+            (LoadKind::NodeForce { node, edge }, Frame::Material) => {
+                let weights = network.edges()[*edge].map(|end| if end == *node { 1.0 } else { 0.0 });
+                Box::new(FollowerForce::new(network, vec![(*edge, weights)], channels))
+            }
+            (LoadKind::ForcePerLength { edges }, Frame::Laboratory) => {
+                let shares = |&edge: &usize| network.edges()[edge].map(|node| (node, 0.5 * lengths[edge]));
+                let nodes: Vec<(usize, f64)> = edges.iter().flat_map(shares).collect();
+                Box::new(NodeForce::new(network, &nodes, channels))
+            }
+            (LoadKind::ForcePerLength { edges }, Frame::Material) => {
+                let edges = edges.iter().map(|&edge| halves(edge)).collect();
+                Box::new(FollowerForce::new(network, edges, channels))
+            }
+            (LoadKind::EdgeTorque { edge }, Frame::Laboratory) => {
+                Box::new(EdgeTorque::new(network, vec![(*edge, 1.0)], channels))
+            }
+            (LoadKind::EdgeTorque { edge }, Frame::Material) => {
+                Box::new(FollowerTorque::new(network, vec![(*edge, 1.0)], channels))
+            }
+            (LoadKind::TorquePerLength { edges }, Frame::Laboratory) => {
+                Box::new(EdgeTorque::new(network, edges.iter().map(|&edge| whole(edge)).collect(), channels))
+            }
+            (LoadKind::TorquePerLength { edges }, Frame::Material) => {
+                Box::new(FollowerTorque::new(network, edges.iter().map(|&edge| whole(edge)).collect(), channels))
+            }
+        };
+        terms.push(term);
+    }
+    if let Some(magnetism) = &specification.magnetism {
+        let channels = inputs.add_vector(magnetism.field.clone());
+        terms.push(Box::new(Magnetism::new(network, magnetism.moments.clone(), channels, magnetism.gradient)));
+    }
+    terms
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::balance::{Balance, Step, Unknowns};
+use super::balance::{Balance, Drives, Step, Unknowns};
 use super::contact_model::ContactModel;
 use super::control::Control;
 use super::failure::{StepError, TryError};
@@ -18,6 +18,7 @@ use super::threads;
 use crate::Vec3;
 use crate::contact::spillmann::ContactSolver;
 use crate::elastic::motors::Drive;
+use crate::fluid::ambient::Ambient;
 use crate::rod::configuration::ReferenceFrames;
 
 /// Residual to which the force balance is solved between passes of the contact loop.
@@ -240,7 +241,7 @@ impl Simulation {
         let (t0, t1) = (self.state.time, self.state.time + dt);
         let mut trial = std::mem::take(&mut self.trial);
         let prepared = self.prepare(&mut trial, t0, t1);
-        let solved = prepared.and_then(|motors| self.solve(motors, dt, order, &mut trial));
+        let solved = prepared.and_then(|drives| self.solve(drives, dt, order, &mut trial));
         self.trial = trial;
         let angles = solved?;
         let missed = self.state.history.prediction_errors(
@@ -262,7 +263,7 @@ impl Simulation {
     }
 
     /// Motor angles and torques at the end of the step; the guess, with the prescribed degrees of freedom set.
-    fn prepare(&self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<(Vec<f64>, Vec<f64>), TryError> {
+    fn prepare(&self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<Drives, TryError> {
         let mut angles = self.state.motor_angles.clone();
         let mut torques = vec![0.0; angles.len()];
         for (k, motor) in self.model.motors.iter().enumerate() {
@@ -286,17 +287,12 @@ impl Simulation {
                 clamp.edges.iter().for_each(|&dof| target[dof] = state.q[dof] + turn);
             }
         }
-        Ok((angles, torques))
+        let inputs = self.model.inputs.values(t1)?;
+        Ok(Drives { motor_angles: angles, motor_torques: torques, inputs, ambient: None })
     }
 
     /// Solves the step from the guess, contact included; the motor angles at its end.
-    fn solve(
-        &mut self,
-        motors: (Vec<f64>, Vec<f64>),
-        dt: f64,
-        order: usize,
-        trial: &mut Unknowns,
-    ) -> Result<Vec<f64>, TryError> {
+    fn solve(&mut self, mut drives: Drives, dt: f64, order: usize, trial: &mut Unknowns) -> Result<Vec<f64>, TryError> {
         let Self { model, state, balance, scheme, settings, work, contact, statistics, positions, stiffness, .. } =
             self;
         let dofs = model.network.node_dofs();
@@ -317,7 +313,15 @@ impl Simulation {
             balance.place_fluid(positions, statistics)?;
             self.fluid_step = Some(state.steps);
         }
-        let step = Step::new(*scheme, state, dt, order, motors);
+        if !model.flows.is_empty() {
+            if order == 1 {
+                place(&state.q, positions);
+            }
+            let mut ambient = Ambient::default();
+            ambient.update(&model.flows, positions, model.network.edges(), state.time + dt)?;
+            drives.ambient = Some(ambient);
+        }
+        let step = Step::new(*scheme, state, dt, order, drives);
         balance.begin(model, &step, statistics)?;
         let failed = |failure: newton::NewtonFailure| TryError::Solve {
             residual: failure.residual,
@@ -382,8 +386,7 @@ impl Simulation {
     }
 
     fn accept(&mut self, angles: Vec<f64>, dt: f64, order: usize, missed: &[f64]) {
-        let motors = (Vec::new(), Vec::new());
-        let step = Step::new(self.scheme, &self.state, dt, order, motors);
+        let step = Step::new(self.scheme, &self.state, dt, order, Drives::default());
         let increment = step.increment();
         let velocity: Vec<f64> =
             self.trial.q.iter().enumerate().map(|(dof, &value)| increment.rate_of(dof, value)).collect();

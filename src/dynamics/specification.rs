@@ -1,8 +1,12 @@
 //! What a scene says, as plain data in SI units; the scene's description in Python fills it in.
 
-use crate::Vec3;
 use crate::elastic::signal::Signal;
+use crate::fluid::ambient::AmbientFlow;
+use crate::fluid::ambient::function::{FlowFunction, GivenFlow};
+use crate::fluid::ambient::linear::LinearFlow;
+use crate::fluid::ambient::poiseuille::Poiseuille;
 use crate::fluid::product::FarFieldChoice;
+use crate::{Mat3, Vec3};
 
 /// A motor at a hinge.
 #[derive(Debug, Clone)]
@@ -113,6 +117,125 @@ pub struct ContactSpecification {
     pub colliding: Vec<bool>,
 }
 
+/// Which axes the components of a load refer to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frame {
+    /// Fixed in space.
+    Laboratory,
+    /// The material frame `m1, m2, t` of an edge.
+    Material,
+}
+
+/// Where a load acts.
+#[derive(Debug, Clone)]
+pub enum LoadKind {
+    /// Force on a node, N; with components on the material frame of an edge that ends there.
+    NodeForce {
+        /// The node.
+        node: usize,
+        /// The edge whose frame counts, if it does.
+        edge: usize,
+    },
+    /// Torque on an edge, N m.
+    EdgeTorque {
+        /// The edge.
+        edge: usize,
+    },
+    /// Force per rest length, N/m.
+    ForcePerLength {
+        /// The edges.
+        edges: Vec<usize>,
+    },
+    /// Torque per rest length, N.
+    TorquePerLength {
+        /// The edges.
+        edges: Vec<usize>,
+    },
+}
+
+/// A load whose components follow signals.
+#[derive(Debug, Clone)]
+pub struct SignalLoadSpecification {
+    /// Where it acts.
+    pub kind: LoadKind,
+    /// Which axes its components refer to.
+    pub frame: Frame,
+    /// Its components.
+    pub signal: [Signal; 3],
+}
+
+/// Magnetised edges in a field.
+#[derive(Debug, Clone)]
+pub struct MagnetismSpecification {
+    /// Edges and their moments on `m1, m2, t`, A m^2.
+    pub moments: Vec<(usize, Vec3)>,
+    /// Field at the origin, T.
+    pub field: [Signal; 3],
+    /// `dB_i/dx_j`, T/m.
+    pub gradient: Mat3,
+}
+
+/// A background flow.
+#[derive(Clone)]
+pub enum FlowSpecification {
+    /// `U(t) + s(t) G (x - c)`.
+    Linear {
+        /// Velocity at the center, m/s.
+        velocity: [Signal; 3],
+        /// `du_i/dx_j`, 1/s.
+        gradient: Mat3,
+        /// Factor on the gradient.
+        strength: Signal,
+        /// The center, m.
+        center: Vec3,
+    },
+    /// Through a tube, or between plates with the given normal.
+    Poiseuille {
+        /// Unit vector along the flow.
+        direction: Vec3,
+        /// Unit normal of the plates; none for a tube.
+        normal: Option<Vec3>,
+        /// A point of the axis or the middle plane, m.
+        center: Vec3,
+        /// Radius, or half the distance of the plates, m.
+        radius: f64,
+        /// Speed at the middle, m/s.
+        speed: Signal,
+    },
+    /// A function of points and time.
+    Function {
+        /// The function.
+        function: FlowFunction,
+        /// Distance of the differences for the vorticity, m.
+        reach: f64,
+    },
+}
+
+impl std::fmt::Debug for FlowSpecification {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str(match self {
+            Self::Linear { .. } => "Linear",
+            Self::Poiseuille { .. } => "Poiseuille",
+            Self::Function { .. } => "Function",
+        })
+    }
+}
+
+impl FlowSpecification {
+    /// The flow it describes.
+    pub fn flow(&self) -> Box<dyn AmbientFlow> {
+        match self.clone() {
+            Self::Linear { velocity, gradient, strength, center } => {
+                Box::new(LinearFlow::new(velocity, gradient, strength, center))
+            }
+            Self::Poiseuille { direction, normal, center, radius, speed } => {
+                Box::new(Poiseuille::new(direction, normal, center, radius, speed))
+            }
+            Self::Function { function, reach } => Box::new(GivenFlow::new(function, reach)),
+        }
+    }
+}
+
 /// A whole scene.
 #[derive(Debug, Clone)]
 pub struct Specification {
@@ -150,6 +273,12 @@ pub struct Specification {
     pub clamps: Vec<ClampSpecification>,
     /// Point loads, N.
     pub loads: Vec<(usize, Vec3)>,
+    /// Loads that follow signals.
+    pub signal_loads: Vec<SignalLoadSpecification>,
+    /// Magnetised edges and the field they are in.
+    pub magnetism: Option<MagnetismSpecification>,
+    /// Background flows; they add up.
+    pub flows: Vec<FlowSpecification>,
     /// Gravity, m/s^2.
     pub gravity: Vec3,
     /// Fluid.

@@ -7,9 +7,11 @@
 //! * [`product`]: with a stored matrix or without, by the number of nodes.
 //! * [`rss`]: nonlocal drag by regularized Stokeslet segments.
 //! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
+//! * [`ambient`]: prescribed background flows.
 //! * [`twist_drag`]: resistance of an edge to spinning about its own centreline.
 //! * [`head`]: drag and counter-torque of the seed's head.
 
+pub mod ambient;
 pub mod far_field;
 pub mod head;
 pub mod lanes;

@@ -46,7 +46,8 @@ impl Term for TwistDrag {
             // Frames transported in time do not spin, so the material's spin in a step is the change of its angle.
             let dof = element.dofs[3];
             let rate = coefficient * increment.rate;
-            let torque = coefficient * increment.rate_of(dof, configuration.q()[dof]);
+            let background = increment.background.map_or(0.0, |background| background.edge_spins[edge]);
+            let torque = coefficient * (increment.rate_of(dof, configuration.q()[dof]) - background);
             // A torque about the tangent does work on the holonomy of the frame too; without its share on the nodes the total
             // torque would balance to second order in the step only.
             let spin = configuration.holonomy(edge).gradient;

@@ -22,6 +22,21 @@ pub struct Increment<'a> {
     pub velocity: &'a [f64],
     /// What `drift` is to the degrees of freedom, to their rates.
     pub velocity_drift: &'a [f64],
+    /// Values of the loads' signals at the end of the step.
+    pub inputs: &'a [f64],
+    /// The background flow, if there is any.
+    pub background: Option<Background<'a>>,
+}
+
+/// What a background flow is at the nodes and edges of a scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Background<'a> {
+    /// Velocity at every node, m/s.
+    pub node_velocities: &'a [Vec3],
+    /// Half the vorticity at every node, rad/s.
+    pub node_spins: &'a [Vec3],
+    /// Half the vorticity about the tangent of every edge, rad/s.
+    pub edge_spins: &'a [f64],
 }
 
 impl Increment<'_> {
