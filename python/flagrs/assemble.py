@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from flagrs.contact_scales import barrier_stiffness, slip_velocity
 from flagrs.errors import SceneError, not_allowed
-from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology
-from flagrs.scene.signal import Signal
+from flagrs.native_loads import native_flows, native_loads, native_magnetism, native_signal
+from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, rod_topology
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
 
 #: Excluded rest arc length over the sum of radii where a contact gives none; see docs/theory/contact.md.
@@ -51,7 +50,9 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "motors": [_motor(scene, motor) for motor in scene.motors],
         "head": None if scene.head is None else _head(scene, scene.head),
         "clamps": [_clamp(scene, clamp) for clamp in scene.clamps],
-        "loads": [(scene.node_offset(load.rod) + load.node, load.force.tolist()) for load in scene.loads],
+        "loads": native_loads(scene),
+        "magnetism": native_magnetism(scene),
+        "flows": native_flows(scene),
         "gravity": scene.gravity.tolist(),
         "fluid": None if scene.fluid is None else _fluid(scene, scene.fluid),
         "contact": None if scene.contact is None else _contact(scene, scene.contact),
@@ -78,12 +79,6 @@ def _directors(scene: Scene) -> list[tuple[int, list[float]]]:
     return [(edge, director.tolist()) for edge, director in given if director is not None]
 
 
-def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[[float], float]:
-    if isinstance(signal, Table):
-        return np.array(signal.times), np.array(signal.values)
-    return signal
-
-
 def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
     rod = scene.rods[motor.rod]
     hinge, second = hinge_of_motor(rod, motor)
@@ -92,7 +87,7 @@ def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
         "hinge": offset + hinge,
         "shaft_second": second,
         "by_torque": motor.drive == "torque",
-        "signal": _signal(motor.signal),
+        "signal": native_signal(motor.signal),
     }
 
 
@@ -148,7 +143,7 @@ def _clamp(scene: Scene, clamp: Clamp) -> dict[str, Any]:
     return {
         "nodes": [nodes + node for node in clamp.nodes],
         "edges": [edges + edge for edge in clamp.edges],
-        "angular_velocity": _signal(clamp.angular_velocity),
+        "angular_velocity": native_signal(clamp.angular_velocity),
         "velocity": clamp.velocity.tolist(),
     }
 

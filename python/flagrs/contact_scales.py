@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from flagrs.scene import Contact, PointLoad, Rod, Scene
+from flagrs.native_loads import largest_load
+from flagrs.scene import Contact, Rod, Scene
 from flagrs.time_step import fastest_rate, size
 
 #: Magnitude of the barrier's derivative over its range at the middle of the range, where centrelines are the
@@ -27,7 +28,7 @@ BENT = 0.1
 def force_per_length(scene: Scene) -> float:
     """Return the force per length that contacts typically bear [N/m]: of drag, weight, loads or bending."""
     rods = _yielding(scene)
-    loaded = max((_load(scene, load) for load in scene.loads), default=0.0)
+    loaded = max((largest_load(scene, load) for load in scene.loads), default=0.0)
     driven = max(loaded, *(max(_drag(scene, rod), _weight(scene, rod)) for rod in rods))
     borne = max(GATHERED * driven, *(BENT * _bending(rod) for rod in rods))
     # Single edges that nothing drives: what stretches them by a thousandth, over their length.
@@ -97,7 +98,3 @@ def _weight(scene: Scene, rod: Rod) -> float:
     buoyancy = 0.0 if scene.fluid is None else scene.fluid.density
     area = math.pi * float(rod.radius_array().max()) ** 2
     return abs(rod.material.density - buoyancy) * area * float(np.linalg.norm(scene.gravity))
-
-
-def _load(scene: Scene, load: PointLoad) -> float:
-    return float(np.linalg.norm(load.force)) / float(scene.rods[load.rod].rest_lengths().sum())

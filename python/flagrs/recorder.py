@@ -17,7 +17,7 @@ import numpy.typing as npt
 from flagrs import trajectory_file
 from flagrs.errors import FlagrsError
 from flagrs.frame import checked, shapes_of
-from flagrs.scene import Scene, codec, signal_value
+from flagrs.scene import Scene, codec
 from flagrs.scene.values import FloatArray
 from flagrs.trajectory import Trajectory, recorded_scene, trajectory_from
 from flagrs.trajectory_file import Contents, State, TrajectoryWriter
@@ -68,7 +68,8 @@ class Recorder:
             "settings": json.dumps(dict(settings), allow_nan=False),
         }
         frames = {name: np.zeros((0, *shape)) for name, shape in shapes_of(scene).items()}
-        signals = {name: np.zeros(0) for name in codec.functions_of(scene)}
+        sampled = codec.sampled_functions_of(scene)
+        signals = {name: codec.empty_samples(function) for name, function in sampled.items()}
         self._start(path, scene, Contents(manifest, frames, signals))
 
     @classmethod
@@ -97,8 +98,8 @@ class Recorder:
         self.scene = scene
         self._contents = contents
         self._shapes = shapes_of(scene)
-        self._functions = codec.functions_of(scene)
-        self._waiting: list[tuple[dict[str, FloatArray], dict[str, float]]] = []
+        self._functions = codec.sampled_functions_of(scene)
+        self._waiting: list[tuple[dict[str, FloatArray], dict[str, FloatArray]]] = []
         self._waiting_since = time.perf_counter()
         times = contents.frames["time"]
         self._last_time = float(times[-1]) if len(times) else -np.inf
@@ -129,7 +130,7 @@ class Recorder:
             raise FlagrsError(
                 f"frame at t = {now:g} s: not later than the one before, at {self._last_time:g} s"
             )
-        samples = {name: signal_value(function, now) for name, function in self._functions.items()}
+        samples = {name: codec.sample(function, now) for name, function in self._functions.items()}
         self._waiting.append((arrays, samples))
         self._last_time = now
         self._count += 1

@@ -453,22 +453,19 @@ fn dissipative_terms(
     if let Some(head) = &specification.head {
         terms.push(Box::new(Head::new(network, head.node, head.neighbours, head.translation, head.rotation)));
     }
-    let forces = loads(specification, network, dof_count, lengths);
+    let forces = weights(specification, network, dof_count, lengths);
     if forces.iter().any(|&force| force != 0.0) {
         terms.push(Box::new(Loads::new(forces)));
     }
     terms
 }
 
-fn loads(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
+fn weights(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
     let mut forces = vec![0.0; dof_count];
     let mut add = |node: usize, force: Vec3| {
         let dof = network.node_dofs()[node];
         (0..3).for_each(|c| forces[dof + c] += force[c]);
     };
-    for &(node, force) in &specification.loads {
-        add(node, force);
-    }
     for (k, &[i, j]) in network.edges().iter().enumerate() {
         let buoyancy = specification.fluid.as_ref().map_or(0.0, |fluid| fluid.density);
         let volume = PI * specification.radius[k].powi(2) * lengths[k];
@@ -506,7 +503,7 @@ fn load_terms(
     inputs: &mut Inputs,
 ) -> Vec<Box<dyn Term>> {
     let mut terms: Vec<Box<dyn Term>> = Vec::new();
-    for load in &specification.signal_loads {
+    for load in &specification.loads {
         let channels = inputs.add_vector(load.signal.clone());
         // Per length: half of an edge's share goes to each of its nodes.
         let halves = |edge: usize| (edge, [0.5 * lengths[edge]; 2]);

@@ -155,7 +155,7 @@ pub enum LoadKind {
 
 /// A load whose components follow signals.
 #[derive(Debug, Clone)]
-pub struct SignalLoadSpecification {
+pub struct LoadSpecification {
     /// Where it acts.
     pub kind: LoadKind,
     /// Which axes its components refer to.
@@ -271,10 +271,8 @@ pub struct Specification {
     pub head: Option<HeadSpecification>,
     /// Clamps.
     pub clamps: Vec<ClampSpecification>,
-    /// Point loads, N.
-    pub loads: Vec<(usize, Vec3)>,
-    /// Loads that follow signals.
-    pub signal_loads: Vec<SignalLoadSpecification>,
+    /// Loads.
+    pub loads: Vec<LoadSpecification>,
     /// Magnetised edges and the field they are in.
     pub magnetism: Option<MagnetismSpecification>,
     /// Background flows; they add up.

@@ -2,6 +2,7 @@
 //!
 //! * [`specification`]: a scene's plain data from a mapping of arrays.
 //! * [`simulation`]: the simulation class.
+//! * [`loads`]: loads, magnetism and background flows from mappings.
 //! * [`far_field`]: the product with the mobility without its matrix.
 //! * [`numerics`]: mobility, velocity and distances on plain arrays.
 //! * [`errors`]: errors of the core as Python exceptions.
@@ -10,6 +11,7 @@
 mod arrays;
 mod errors;
 mod far_field;
+mod loads;
 mod numerics;
 mod simulation;
 mod specification;

@@ -6,6 +6,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 use super::arrays::{pairs, points, values};
+use super::loads::{FlowInput, LoadInput, MagnetismInput};
 use crate::Vec3;
 use crate::dynamics::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
@@ -16,14 +17,14 @@ use crate::fluid::product::FarFieldChoice;
 
 /// A signal: a number, a pair of arrays (times, values), or a callable.
 #[derive(FromPyObject)]
-enum SignalInput<'py> {
+pub(super) enum SignalInput<'py> {
     Constant(f64),
     Table(PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>),
     Function(Py<PyAny>),
 }
 
 impl SignalInput<'_> {
-    fn signal(self) -> Signal {
+    pub(super) fn signal(self) -> Signal {
         match self {
             Self::Constant(value) => Signal::Constant(value),
             Self::Table(times, samples) => Signal::Table { times: values(&times), values: values(&samples) },
@@ -110,7 +111,9 @@ pub struct SceneInput<'py> {
     motors: Vec<MotorInput<'py>>,
     head: Option<HeadInput>,
     clamps: Vec<ClampInput<'py>>,
-    loads: Vec<(usize, [f64; 3])>,
+    loads: Vec<LoadInput<'py>>,
+    magnetism: Option<MagnetismInput<'py>>,
+    flows: Vec<FlowInput<'py>>,
     gravity: [f64; 3],
     fluid: Option<FluidInput<'py>>,
     contact: Option<ContactInput>,
@@ -162,7 +165,9 @@ impl SceneInput<'_> {
                     velocity: Vec3::from(clamp.velocity),
                 })
                 .collect(),
-            loads: self.loads.into_iter().map(|(node, force)| (node, Vec3::from(force))).collect(),
+            loads: self.loads.into_iter().map(LoadInput::specification).collect::<PyResult<_>>()?,
+            magnetism: self.magnetism.map(MagnetismInput::specification),
+            flows: self.flows.into_iter().map(FlowInput::specification).collect(),
             gravity: Vec3::from(self.gravity),
             fluid: self.fluid.map(fluid),
             contact: self.contact.map(contact),

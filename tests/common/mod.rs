@@ -44,7 +44,6 @@ pub fn scene(nodes: Vec<Vec3>, edges: Vec<[usize; 2]>, hinges: Vec<[usize; 2]>) 
         head: None,
         clamps: vec![],
         loads: vec![],
-        signal_loads: vec![],
         magnetism: None,
         flows: vec![],
         gravity: Vec3::zeros(),

@@ -115,6 +115,8 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
         head: None,
         clamps: vec![],
         loads: vec![],
+        magnetism: None,
+        flows: vec![],
         gravity: Vec3::zeros(),
         fluid: Some(FluidSpecification {
             viscosity: substance.viscosity,

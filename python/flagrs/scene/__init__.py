@@ -2,28 +2,37 @@
 
 from flagrs.scene.clamp import Clamp
 from flagrs.scene.contact_model import Contact
+from flagrs.scene.flow import FlowFunction, LinearFlow, PoiseuilleFlow
 from flagrs.scene.fluid_model import Fluid
 from flagrs.scene.head import Head
-from flagrs.scene.load import PointLoad
+from flagrs.scene.load import LineLoad, PointLoad
+from flagrs.scene.magnetic_field import MagneticField
 from flagrs.scene.material import Material
 from flagrs.scene.motor import Motor
 from flagrs.scene.plan import Plan
 from flagrs.scene.rod import Rod
 from flagrs.scene.scene import Scene
 from flagrs.scene.signal import Signal, Table, signal_value
+from flagrs.scene.vector_signal import VectorSignal
 
 __all__ = [
     "Clamp",
     "Contact",
+    "FlowFunction",
     "Fluid",
     "Head",
+    "LineLoad",
+    "LinearFlow",
+    "MagneticField",
     "Material",
     "Motor",
     "Plan",
     "PointLoad",
+    "PoiseuilleFlow",
     "Rod",
     "Scene",
     "Signal",
     "Table",
+    "VectorSignal",
     "signal_value",
 ]

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from flagrs.errors import SceneError, faulty
+from flagrs.errors import FlagrsError, SceneError, faulty
+from flagrs.scene.flow import CheckedFlow
 from flagrs.scene.part import Part
+from flagrs.scene.signal import signal_value
+from flagrs.scene.values import FloatArray
+from flagrs.scene.vector_signal import VectorFunction
 
 
 def refuse(path: str, function: Callable[[float], float]) -> Any:
@@ -55,9 +60,9 @@ def named_function(path: str, function: Any) -> Any:
 
 
 def filled(data: Any, functions: Mapping[str, Any], path: str = "") -> Any:
-    """Return what `plain` gave with `named_function`, with the functions replaced by path."""
+    """Return what `plain` gave with `named_function`, with functions replaced by path, or by a word that they are not known."""
     if isinstance(data, dict) and data.keys() == {"function"}:
-        return functions[path]
+        return functions[path] if path in functions else Unrecorded(data["function"])
     if isinstance(data, dict):
         dot = "." if path else ""
         return {name: filled(field, functions, f"{path}{dot}{name}") for name, field in data.items()}
@@ -71,6 +76,33 @@ def functions_of(scene: Part) -> dict[str, Callable[[float], float]]:
     found: dict[str, Callable[[float], float]] = {}
     plain(scene, found.setdefault)
     return found
+
+
+def sampled_functions_of(scene: Part) -> dict[str, Callable[[float], Any]]:
+    """Return those of `functions_of` that depend on time alone, so that a record can hold samples of them."""
+    return {path: value for path, value in functions_of(scene).items() if not isinstance(value, CheckedFlow)}
+
+
+def sample(function: Callable[[float], Any], time: float) -> FloatArray:
+    """Return what a function of time gives at an instant, a number or a vector."""
+    vector = isinstance(function, VectorFunction)
+    return np.asarray(function(time) if vector else signal_value(function, time), dtype=np.float64)
+
+
+def empty_samples(function: Callable[[float], Any]) -> FloatArray:
+    """Return no samples of a function, of the shape that some have."""
+    return np.zeros((0, 3) if isinstance(function, VectorFunction) else 0)
+
+
+@dataclass(frozen=True)
+class Unrecorded:
+    """What stands for a background flow of which a record holds the name alone."""
+
+    name: str
+
+    def __call__(self, points: FloatArray, time: float) -> FloatArray:
+        """Raise the error that says so."""
+        raise FlagrsError(f"the background flow was {self.name}, a Python function, which no file can hold")
 
 
 def from_json(text: str) -> dict[str, Any]:

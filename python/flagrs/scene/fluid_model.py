@@ -6,9 +6,10 @@ import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import PlainValidator
+from pydantic import PlainValidator, field_validator
 
 from flagrs.errors import not_allowed
+from flagrs.scene.flow import Flow, flow_of
 from flagrs.scene.part import Part
 from flagrs.scene.values import Array, Bounds, Flag, FloatArray, index, number, optional_number
 
@@ -60,6 +61,9 @@ class Fluid(Part):
     far_field_nodes : int or None
         Immersed nodes from which on the method is used and the dense matrix of the segments is never formed;
         0: always. None: 500, where a step takes the same time either way.
+    background : sequence of flows
+        Flows there are without the filaments, which add up: `LinearFlow`, `PoiseuilleFlow`, `FlowFunction`. A
+        single one may stand for a list of one. Drag acts on velocities relative to them.
     density : float
         Density of the fluid [kg/m^3], for buoyancy under gravity.
     """
@@ -73,6 +77,15 @@ class Fluid(Part):
     far_field_error: Annotated[float, number(Bounds("1", at_least=1e-9, at_most=0.1))] = 1e-6
     far_field_nodes: Annotated[int | None, PlainValidator(_count)] = None
     density: Annotated[float, number(Bounds("kg/m^3", at_least=0.0, at_most=3e4))] = 0.0
+
+    background: tuple[Flow, ...] = ()
+
+    @field_validator("background", mode="before")
+    @classmethod
+    def _kinds_of_flow(cls, value: Any) -> Any:
+        """Let a single flow stand for a list of one, and tell the kinds apart."""
+        listed = (value,) if isinstance(value, Part | dict) else value
+        return tuple(map(flow_of, listed)) if isinstance(listed, list | tuple) else listed
 
     @property
     def crossover(self) -> int:

@@ -1,28 +1,101 @@
-"""Constant forces on nodes."""
+"""Loads: forces and torques on nodes, edges and stretches of a rod, that follow time and may turn with the rod."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Any, Literal
 
-from pydantic import PlainValidator
+from pydantic import Field, model_validator
 
+from flagrs.errors import SceneError, faulty
 from flagrs.scene.part import Part
-from flagrs.scene.values import Array, Bounds, FloatArray, Index
+from flagrs.scene.values import Index, Indices, origin
+from flagrs.scene.vector_signal import CheckedVectorSignal, is_zero
+
+Frame = Literal["laboratory", "material"]
 
 
 class PointLoad(Part):
-    """A constant force on one node.
+    """A force on a node, or a torque on an edge.
 
     Attributes
     ----------
-    node : int
-        Node of the rod that is loaded.
-    force : ndarray
+    node : int or None
+        Node of the rod on which the force acts.
+    force : vector, Table of vectors, or function of time
         Force (3,) [N].
+    edge : int or None
+        Edge of the rod on which the torque acts, and whose material frame counts for
+        ``frame="material"``; None: the edge at the node, if there is just one.
+    torque : vector, Table of vectors, or function of time
+        Torque (3,) [N m].
+    frame : str
+        Which axes the components refer to: ``laboratory``, or ``material`` for ``m1, m2, t`` of the edge, so
+        that the load turns with the rod (a follower load).
+    rod : int
+        Index of the rod in the scene.
+
+    Examples
+    --------
+    >>> push = PointLoad(node=4, force=(0.0, 0.0, 1e-3))
+    >>> follower = PointLoad(node=4, force=(0.0, 0.0, -1e-3), frame="material")
+    """
+
+    node: Index | None = None
+    force: CheckedVectorSignal = Field(default_factory=origin)
+    edge: Index | None = None
+    torque: CheckedVectorSignal = Field(default_factory=origin)
+    frame: Frame = "laboratory"
+    rod: Index = 0
+
+    @model_validator(mode="after")
+    def _check(self) -> PointLoad:
+        if self.node is None and not is_zero(self.force):
+            raise faulty("node", "missing; a force acts on a node", "a node of the rod")
+        if self.node is None and self.edge is None:
+            raise faulty("node", "neither node nor edge given", "a node for a force, an edge for a torque")
+        return self
+
+
+class LineLoad(Part):
+    """A force or a torque per rest length of a rod.
+
+    Attributes
+    ----------
+    force : vector, Table of vectors, or function of time
+        Force per length (3,) [N/m].
+    torque : vector, Table of vectors, or function of time
+        Torque per length (3,) [N].
+    edges : sequence of int or None
+        Edges of the rod; None: all.
+    frame : str
+        ``laboratory`` or ``material``, as for `PointLoad`.
     rod : int
         Index of the rod in the scene.
     """
 
-    node: Index
-    force: Annotated[FloatArray, PlainValidator(Array(((3,),), Bounds("N")))]
+    force: CheckedVectorSignal = Field(default_factory=origin)
+    torque: CheckedVectorSignal = Field(default_factory=origin)
+    edges: Indices | None = None
+    frame: Frame = "laboratory"
     rod: Index = 0
+
+    @model_validator(mode="after")
+    def _check(self) -> LineLoad:
+        if self.edges == ():
+            raise SceneError(
+                "edges: a load on no edge loads nothing",
+                field="edges",
+                value=(),
+                allowed="at least one edge, or None for all",
+            )
+        return self
+
+
+Load = PointLoad | LineLoad
+
+
+def load_of(value: Any) -> Any:
+    """Return the kind of load that a mapping describes; other values are left as they are."""
+    if not isinstance(value, dict):
+        return value
+    return PointLoad(**value) if "node" in value or "edge" in value else LineLoad(**value)

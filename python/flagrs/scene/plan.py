@@ -125,6 +125,7 @@ def _terms(scene: Scene) -> tuple[list[str], list[str]]:
     fluid = scene.fluid
     flows = fluid is not None and fluid.model != "none"
     heavy = bool(scene.gravity.any())
+    magnetic = any(rod.magnetization is not None for rod in scene.rods)
     turned = [motor.drive for motor in scene.motors]
     words = {
         "fluid": f"{fluid.model} fluid, viscosity {fluid.viscosity:g} Pa s" if fluid and flows else "",
@@ -134,7 +135,9 @@ def _terms(scene: Scene) -> tuple[list[str], list[str]]:
         if turned
         else "",
         "clamps": f"{len(scene.clamps)} clamps" if scene.clamps else "",
-        "point loads": f"{len(scene.loads)} point loads" if scene.loads else "",
+        "loads": f"{len(scene.loads)} loads" if scene.loads else "",
+        "magnetism": "magnetism" if scene.magnetic_field and magnetic else "",
+        "background flow": f"{len(fluid.background)} background flows" if fluid and fluid.background else "",
         "contact": f"contact ({scene.contact.method})" if scene.contact else "",
         "gravity": f"gravity {np.linalg.norm(scene.gravity):g} m/s^2" if heavy else "",
         "buoyancy": "buoyancy" if heavy and fluid and fluid.density > 0.0 else "",

@@ -70,6 +70,9 @@ class Rod(Part):
         Initial angle (E,) of each edge's material frame [rad]; None: zero.
     director : ndarray or None
         Direction (3,) of the material director m1 on the first edge; None: any.
+    magnetization : ndarray or None
+        Magnetization (3,) or (E, 3) along the material directors ``m1, m2`` and the tangent [A/m]; None: not
+        magnetic.
     immersed : bool or ndarray
         Edges, all or (E,), on which the fluid acts.
     colliding : bool or ndarray
@@ -98,6 +101,7 @@ class Rod(Part):
     natural_twist: Annotated[float | FloatArray | None, optional_array(_PER_HINGE, Bounds("rad"))] = None
     theta: Annotated[FloatArray | None, optional_array((("E",),), Bounds("rad"))] = None
     director: Annotated[FloatArray | None, optional_array(((3,),), Bounds("1"))] = None
+    magnetization: Annotated[FloatArray | None, optional_array(((3,), ("E", 3)), Bounds("A/m"))] = None
     immersed: Annotated[bool | BoolArray, PlainValidator(switches)] = True
     colliding: Annotated[bool | BoolArray, PlainValidator(switches)] = True
     name: str | None = None

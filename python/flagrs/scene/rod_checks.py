@@ -91,6 +91,8 @@ def _shapes(rod: Rod) -> Iterator[SceneError]:
         value = getattr(rod, field)
         if np.ndim(value) == 1 and len(value) != edges:
             yield not_allowed(field, value, f"one value per edge, {edges}")
+    if np.ndim(rod.magnetization) == 2 and len(rod.magnetization) != edges:  # type: ignore[arg-type]
+        yield not_allowed("magnetization", rod.magnetization, f"one vector per edge, {edges}")
     for field, single in (("EI", 2), ("GJ", 0), ("natural_curvature", 1), ("natural_twist", 0)):
         value = getattr(rod, field)
         if _one_per_hinge(value, field, single) and len(value) != hinges:

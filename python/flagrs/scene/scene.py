@@ -15,7 +15,8 @@ from flagrs.scene.clamp import Clamp
 from flagrs.scene.contact_model import Contact
 from flagrs.scene.fluid_model import Fluid
 from flagrs.scene.head import Head
-from flagrs.scene.load import PointLoad
+from flagrs.scene.load import Load, load_of
+from flagrs.scene.magnetic_field import MagneticField
 from flagrs.scene.motor import Motor
 from flagrs.scene.part import Part
 from flagrs.scene.plan import Plan, plan_of
@@ -37,8 +38,10 @@ class Scene(Part):
         The fluid around them; None: vacuum.
     head : Head or None
         The robot's head.
-    motors, clamps, loads : sequence of Motor, Clamp and PointLoad
+    motors, clamps, loads : sequence of Motor, Clamp, and PointLoad or LineLoad
         What drives, holds and loads the rods. A single part may stand for a list of one.
+    magnetic_field : MagneticField or None
+        The field that magnetised rods are in.
     contact : Contact or None
         How touching edges are kept apart; None: they pass through each other.
     gravity : ndarray
@@ -52,7 +55,8 @@ class Scene(Part):
     head: Head | None = None
     motors: tuple[Motor, ...] = ()
     clamps: tuple[Clamp, ...] = ()
-    loads: tuple[PointLoad, ...] = ()
+    loads: tuple[Load, ...] = ()
+    magnetic_field: MagneticField | None = None
     contact: Contact | None = None
     gravity: Annotated[FloatArray, PlainValidator(Array(((3,),), Bounds("m/s^2")))] = Field(
         default_factory=origin
@@ -64,6 +68,12 @@ class Scene(Part):
     def _listed(cls, value: Any) -> Any:
         """Let a single part stand for a list of one."""
         return (value,) if isinstance(value, Part) else value
+
+    @field_validator("loads", mode="before")
+    @classmethod
+    def _kinds_of_load(cls, value: Any) -> Any:
+        """Tell point loads from line loads, so that errors speak of the right one."""
+        return tuple(map(load_of, value)) if isinstance(value, list | tuple) else value
 
     @model_validator(mode="after")
     def _check(self) -> Scene:

@@ -13,7 +13,7 @@ from flagrs.scene.rod_topology import edges_at_nodes
 if TYPE_CHECKING:
     from flagrs.scene.clamp import Clamp
     from flagrs.scene.head import Head
-    from flagrs.scene.load import PointLoad
+    from flagrs.scene.load import Load
     from flagrs.scene.motor import Motor
     from flagrs.scene.rod import Rod
     from flagrs.scene.scene import Scene
@@ -34,19 +34,19 @@ def _indices(scene: Scene) -> Iterator[SceneError]:
             yield not_allowed(f"{field}.rod", part.rod, f"a rod below {len(scene.rods)}")
             continue
         rod = scene.rods[part.rod]
-        limits = {"node": len(rod.nodes), "shaft": len(rod.edge_array())}
+        limits = {"node": len(rod.nodes), "shaft": len(rod.edge_array()), "edge": len(rod.edge_array())}
         for name, limit in limits.items():
             index = getattr(part, name, None)
             if index is not None and index >= limit:
                 yield not_allowed(f"{field}.{name}", index, f"below {limit}")
         limits = {"nodes": len(rod.nodes), "edges": len(rod.edge_array())}
         for name, limit in limits.items():
-            for position, index in enumerate(getattr(part, name, ())):
+            for position, index in enumerate(getattr(part, name, None) or ()):
                 if index >= limit:
                     yield not_allowed(f"{field}.{name}[{position}]", index, f"below {limit}")
 
 
-def _named_parts(scene: Scene) -> Iterator[tuple[str, Head | Motor | Clamp | PointLoad]]:
+def _named_parts(scene: Scene) -> Iterator[tuple[str, Head | Motor | Clamp | Load]]:
     """Yield every part that sits on a rod, with its path."""
     if scene.head is not None:
         yield "head", scene.head

@@ -21,7 +21,7 @@ class Table(Part):
     times : ndarray
         Instants (n,) [s], strictly increasing, n >= 1.
     values : ndarray
-        Values (n,) at the instants, in the unit of the field the table is given for.
+        Values (n,) at the instants, or vectors (n, 3), in the unit of the field the table is given for.
 
     Examples
     --------
@@ -31,7 +31,7 @@ class Table(Part):
     """
 
     times: Annotated[FloatArray, PlainValidator(Array((("n",),), Bounds("s")))]
-    values: Annotated[FloatArray, PlainValidator(Array((("n",),), Bounds("1")))]
+    values: Annotated[FloatArray, PlainValidator(Array((("n",), ("n", 3)), Bounds("1")))]
 
     @model_validator(mode="after")
     def _check(self) -> Table:
@@ -41,7 +41,7 @@ class Table(Part):
         if (steps <= 0.0).any():
             worst = int(np.argmax(steps <= 0.0)) + 1
             raise not_allowed(f"times[{worst}]", self.times[worst], "later than the instant before it")
-        if self.values.shape != self.times.shape:
+        if len(self.values) != len(self.times):
             raise not_allowed("values", self.values, f"as many values as times, {self.times.size}")
         return self
 
@@ -55,18 +55,21 @@ Signal = float | Table | Callable[[float], float]
 _number = Array(((),), Bounds("1"))
 
 
-def _signal(value: Any) -> Any:
+def scalar_signal(value: Any) -> Any:
+    """Return a number, a table of numbers or a function as it is; raise SceneError for anything else."""
     if isinstance(value, dict):
-        return Table(**value)
+        value = Table(**value)
+    if isinstance(value, Table) and value.values.ndim != 1:
+        raise not_allowed("values", value.values, f"an array of shape ({len(value.times)},)")
     if callable(value):
         return value
     return _number(value)
 
 
 #: Annotation of a field that holds a signal; None is for the field's own default only.
-CheckedSignal = Annotated[Signal, PlainValidator(_signal)]
+CheckedSignal = Annotated[Signal, PlainValidator(scalar_signal)]
 CheckedSignalOrNone = Annotated[
-    Signal | None, PlainValidator(lambda value: None if value is None else _signal(value))
+    Signal | None, PlainValidator(lambda value: None if value is None else scalar_signal(value))
 ]
 
 
