@@ -16,8 +16,8 @@
 //! # The map
 //!
 //! * [`rod`]: networks, frames, strains; [`elastic`]: energies and motors; [`fluid`]: drag models and the head;
-//!   [`forces`]: loads and fields; [`contact`]: distances and contact forces; [`dynamics`]: model, state, schemes, Newton; [`linear`]: matrices.
-//! * Imports run one way: `rod <- elastic, fluid, forces, contact <- dynamics <- python`; `linear` knows nothing of rods.
+//!   [`forces`]: loads and fields; [`kinematics`]: clamps; [`contact`]: distances and contact forces; [`dynamics`]: model, state, schemes, Newton; [`linear`]: matrices.
+//! * Imports run one way: `rod <- elastic, fluid, forces, kinematics, contact <- dynamics <- python`; `linear` knows nothing of rods.
 //! * [`dynamics::simulation::Simulation`] is the way in.
 
 pub mod contact;
@@ -25,6 +25,7 @@ pub mod dynamics;
 pub mod elastic;
 pub mod fluid;
 pub mod forces;
+pub mod kinematics;
 pub mod linear;
 #[cfg(feature = "python")]
 mod python;

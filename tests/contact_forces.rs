@@ -11,7 +11,7 @@ use flagrs::dynamics::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
     Specification,
 };
-use flagrs::elastic::signal::Signal;
+use flagrs::kinematics::clamp::Motion;
 
 const TOLERANCE: f64 = 1e-3;
 
@@ -37,8 +37,8 @@ fn crossed_rods(gap: f64) -> Specification {
     specification.clamps = vec![ClampSpecification {
         nodes: vec![0, 10],
         edges: vec![],
-        angular_velocity: Signal::Constant(0.0),
-        velocity: Vec3::zeros(),
+        axes: [true; 3],
+        motion: Motion::still(),
     }];
     specification.contact = Some(ContactSpecification {
         method: ContactMethodSpecification::SpillmannTeschner { tolerance: TOLERANCE, max_iterations: 500 },

@@ -16,6 +16,7 @@ from flagrs.scene import (
     PointLoad,
     PoiseuilleFlow,
     Rod,
+    Rotation,
     Scene,
     Table,
 )
@@ -40,6 +41,7 @@ __all__ = [
     "PointLoad",
     "PoiseuilleFlow",
     "Rod",
+    "Rotation",
     "Scene",
     "SceneError",
     "Simulation",

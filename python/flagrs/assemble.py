@@ -9,8 +9,8 @@ import numpy as np
 
 from flagrs.contact_scales import barrier_stiffness, slip_velocity
 from flagrs.errors import SceneError, not_allowed
-from flagrs.native_loads import native_flows, native_loads, native_magnetism, native_signal
-from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, rod_topology
+from flagrs.native_loads import native_flows, native_loads, native_magnetism, native_signal, native_vector
+from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Rotation, Scene, rod_topology
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
 
 #: Excluded rest arc length over the sum of radii where a contact gives none; see docs/theory/contact.md.
@@ -144,7 +144,19 @@ def _clamp(scene: Scene, clamp: Clamp) -> dict[str, Any]:
         "nodes": [nodes + node for node in clamp.nodes],
         "edges": [edges + edge for edge in clamp.edges],
         "angular_velocity": native_signal(clamp.angular_velocity),
-        "velocity": clamp.velocity.tolist(),
+        "axes": [axis in clamp.axes for axis in "xyz"],
+        "velocity": native_vector(clamp.velocity),
+        "displacement": native_vector(clamp.displacement),
+        "turning": None if clamp.rotation is None else _turning(clamp.rotation),
+    }
+
+
+def _turning(rotation: Rotation) -> dict[str, Any]:
+    return {
+        "axis": rotation.axis.tolist(),
+        "center": rotation.center.tolist(),
+        "rate": native_signal(rotation.rate),
+        "angle": native_signal(rotation.angle),
     }
 
 

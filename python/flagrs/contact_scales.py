@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from flagrs.native_loads import largest_load
+from flagrs.native_loads import largest_load, largest_speed
 from flagrs.scene import Contact, Rod, Scene
 from flagrs.time_step import fastest_rate, size
 
@@ -87,7 +87,7 @@ def _resistance(scene: Scene, rod: Rod) -> float:
 
 
 def _fastest_clamp(scene: Scene) -> float:
-    return max((float(np.linalg.norm(clamp.velocity)) for clamp in scene.clamps), default=0.0)
+    return max((largest_speed(clamp) for clamp in scene.clamps), default=0.0)
 
 
 def _drag(scene: Scene, rod: Rod) -> float:

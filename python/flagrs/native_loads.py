@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 
 from flagrs.errors import faulty
-from flagrs.scene import LinearFlow, LineLoad, PointLoad, PoiseuilleFlow, Rod, Scene, Table, VectorSignal
+from flagrs.scene import (
+    Clamp,
+    LinearFlow,
+    LineLoad,
+    PointLoad,
+    PoiseuilleFlow,
+    Rod,
+    Scene,
+    Table,
+    VectorSignal,
+)
 from flagrs.scene.flow import Flow
 from flagrs.scene.signal import Signal
 from flagrs.scene.values import FloatArray
@@ -87,7 +97,7 @@ def native_magnetism(scene: Scene) -> dict[str, Any] | None:
 
 
 def moments_of(rod: Rod) -> FloatArray:
-    """Return the magnetic moment (E, 3) of each edge along ``m1, m2, t`` [A m^2]: magnetization times volume."""
+    """Return the magnetic moment (E, 3) of each edge on ``m1, m2, t`` [A m^2]: magnetization times volume."""
     volume = math.pi * rod.radius_array() ** 2 * rod.rest_lengths()
     given = np.zeros(3) if rod.magnetization is None else rod.magnetization
     return np.broadcast_to(given, (len(volume), 3)) * volume[:, None]
@@ -129,6 +139,19 @@ def largest_load(scene: Scene, load: PointLoad | LineLoad) -> float:
     if isinstance(load, LineLoad):
         return force + torque / length
     return force / length + torque / length**2
+
+
+def largest_speed(clamp: Clamp) -> float:
+    """Return the largest speed at which a clamp shifts its nodes, at sampled instants [m/s]."""
+    given = max(float(np.linalg.norm(vector_at(clamp.velocity, time))) for time in _instants(clamp.velocity))
+    if is_zero(clamp.displacement):
+        return given
+    times = _instants(clamp.displacement)
+    places = np.array([vector_at(clamp.displacement, time) for time in times])
+    steps = (
+        np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(times) if len(times) > 1 else np.zeros(1)
+    )
+    return given + float(steps.max())
 
 
 def _instants(signal: VectorSignal) -> FloatArray:

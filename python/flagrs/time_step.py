@@ -39,7 +39,7 @@ def _size_of(rod: Rod) -> float:
 def fastest_rate(scene: Scene) -> float:
     """Return the largest prescribed angular speed [rad/s]; 0 if nothing turns as prescribed."""
     signals: list[Signal] = [motor.speed for motor in scene.motors if motor.speed is not None]
-    signals += [clamp.angular_velocity for clamp in scene.clamps if clamp.edges]
+    signals += [signal for clamp in scene.clamps for signal in clamp.turning_signals()]
     return max((_largest(signal) for signal in signals), default=0.0)
 
 

@@ -24,6 +24,7 @@ use crate::forces::follower::{FollowerForce, FollowerTorque};
 use crate::forces::inputs::Inputs;
 use crate::forces::laboratory::{EdgeTorque, NodeForce};
 use crate::forces::magnetic::Magnetism;
+use crate::kinematics::clamp::{Clamp, ClampedEdge};
 use crate::linear::LinearError;
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{HingeElement, Term};
@@ -70,14 +71,6 @@ pub enum ModelError {
     /// A matrix of the model cannot be analysed.
     #[error(transparent)]
     Linear(#[from] LinearError),
-}
-
-/// A clamp, by degrees of freedom.
-pub(super) struct Clamp {
-    pub nodes: Vec<usize>,
-    pub edges: Vec<usize>,
-    pub angular_velocity: crate::elastic::signal::Signal,
-    pub velocity: Vec3,
 }
 
 /// Everything about a scene that does not change.
@@ -486,10 +479,21 @@ fn clamps(specification: &Specification, network: &Network, dof_count: usize) ->
         .iter()
         .map(|clamp| {
             let nodes: Vec<usize> = clamp.nodes.iter().map(|&node| network.node_dofs()[node]).collect();
-            let edges: Vec<usize> = clamp.edges.iter().map(|&edge| network.edge_dofs()[edge]).collect();
-            nodes.iter().for_each(|&dof| prescribed[dof..dof + 3].fill(true));
-            edges.iter().for_each(|&dof| prescribed[dof] = true);
-            Clamp { nodes, edges, angular_velocity: clamp.angular_velocity.clone(), velocity: clamp.velocity }
+            let whole = clamp.axes == [true; 3];
+            let edges: Vec<ClampedEdge> = clamp
+                .edges
+                .iter()
+                .map(|&edge| ClampedEdge {
+                    dof: network.edge_dofs()[edge],
+                    edge,
+                    rigid: whole && network.edges()[edge].iter().all(|node| clamp.nodes.contains(node)),
+                })
+                .collect();
+            for &dof in &nodes {
+                (0..3).filter(|&c| clamp.axes[c]).for_each(|c| prescribed[dof + c] = true);
+            }
+            edges.iter().for_each(|edge| prescribed[edge.dof] = true);
+            Clamp { nodes, axes: clamp.axes, edges, motion: clamp.motion.clone() }
         })
         .collect();
     (clamps, prescribed)

@@ -277,15 +277,8 @@ impl Simulation {
         state.history.extrapolate(order, (t0, &state.q), |sample| &sample.q, t1, &mut guess.q);
         state.history.extrapolate(order, (t0, &state.density), |sample| &sample.density, t1, &mut guess.density);
         guess.tensions.copy_from_slice(&state.tensions);
-        let target = &mut guess.q;
         for clamp in &self.model.clamps {
-            for &dof in &clamp.nodes {
-                (0..3).for_each(|c| target[dof + c] = state.q[dof + c] + (t1 - t0) * clamp.velocity[c]);
-            }
-            if !clamp.edges.is_empty() {
-                let turn = clamp.angular_velocity.integral(t0, t1)?;
-                clamp.edges.iter().for_each(|&dof| target[dof] = state.q[dof] + turn);
-            }
+            clamp.advance((t0, &state.q), &state.frames, t1, &mut guess.q)?;
         }
         let inputs = self.model.inputs.values(t1)?;
         Ok(Drives { motor_angles: angles, motor_torques: torques, inputs, ambient: None })

@@ -6,6 +6,7 @@ use crate::fluid::ambient::function::{FlowFunction, GivenFlow};
 use crate::fluid::ambient::linear::LinearFlow;
 use crate::fluid::ambient::poiseuille::Poiseuille;
 use crate::fluid::product::FarFieldChoice;
+use crate::kinematics::clamp::Motion;
 use crate::{Mat3, Vec3};
 
 /// A motor at a hinge.
@@ -43,10 +44,10 @@ pub struct ClampSpecification {
     pub nodes: Vec<usize>,
     /// Edges whose angle is held.
     pub edges: Vec<usize>,
-    /// Angular velocity of these edges about their tangent, rad/s.
-    pub angular_velocity: Signal,
-    /// Velocity of these nodes, m/s.
-    pub velocity: Vec3,
+    /// Which coordinates of the nodes are held.
+    pub axes: [bool; 3],
+    /// How they move.
+    pub motion: Motion,
 }
 
 /// The drag model on the immersed edges.

@@ -14,6 +14,7 @@ use crate::dynamics::specification::{
 };
 use crate::elastic::signal::Signal;
 use crate::fluid::product::FarFieldChoice;
+use crate::kinematics::clamp::{Motion, Turning};
 
 /// A signal: a number, a pair of arrays (times, values), or a callable.
 #[derive(FromPyObject)]
@@ -57,11 +58,23 @@ struct HeadInput {
 
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
+struct TurningInput<'py> {
+    axis: [f64; 3],
+    center: [f64; 3],
+    rate: SignalInput<'py>,
+    angle: SignalInput<'py>,
+}
+
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
 struct ClampInput<'py> {
     nodes: Vec<usize>,
     edges: Vec<usize>,
+    axes: [bool; 3],
     angular_velocity: SignalInput<'py>,
-    velocity: [f64; 3],
+    velocity: [SignalInput<'py>; 3],
+    displacement: [SignalInput<'py>; 3],
+    turning: Option<TurningInput<'py>>,
 }
 
 #[derive(FromPyObject)]
@@ -161,8 +174,18 @@ impl SceneInput<'_> {
                 .map(|clamp| ClampSpecification {
                     nodes: clamp.nodes,
                     edges: clamp.edges,
-                    angular_velocity: clamp.angular_velocity.signal(),
-                    velocity: Vec3::from(clamp.velocity),
+                    axes: clamp.axes,
+                    motion: Motion {
+                        velocity: clamp.velocity.map(SignalInput::signal),
+                        displacement: clamp.displacement.map(SignalInput::signal),
+                        turning: clamp.turning.map(|turning| Turning {
+                            axis: Vec3::from(turning.axis),
+                            center: Vec3::from(turning.center),
+                            rate: turning.rate.signal(),
+                            angle: turning.angle.signal(),
+                        }),
+                        spin: clamp.angular_velocity.signal(),
+                    },
                 })
                 .collect(),
             loads: self.loads.into_iter().map(LoadInput::specification).collect::<PyResult<_>>()?,

@@ -9,6 +9,7 @@ use flagrs::dynamics::specification::{
     HeadSpecification, MotorSpecification, Specification,
 };
 use flagrs::elastic::signal::Signal;
+use flagrs::kinematics::clamp::Motion;
 use flagrs::fluid::product::FarFieldChoice;
 
 /// Least arc length of an edge of the flagella, m.
@@ -223,8 +224,8 @@ pub fn clamped_flagella(count: usize) -> Specification {
         .map(|k| ClampSpecification {
             nodes: vec![k * flagellum.len(), k * flagellum.len() + 1],
             edges: vec![k * (flagellum.len() - 1)],
-            angular_velocity: Signal::Constant(-CLAMP_SPEED),
-            velocity: Vec3::zeros(),
+            axes: [true; 3],
+            motion: Motion { spin: Signal::Constant(-CLAMP_SPEED), ..Motion::still() },
         })
         .collect();
     scene.contact = Some(contact(vec![true; scene.edges.len()], 1.076e4));

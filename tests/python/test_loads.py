@@ -50,7 +50,7 @@ def test_a_rod_turns_with_a_fluid_that_turns_like_a_rigid_body():
 
 
 def test_a_stiff_rod_in_shear_turns_as_slender_body_theory_says():
-    # A slender rod lies in the plane of shear and turns by d(angle)/dt = -rate sin^2(angle): cot(angle) grows by rate t.
+    # In the plane of shear d(angle)/dt = -rate sin^2(angle): cot(angle) grows by rate t.
     start = math.radians(60.0)
     along = np.array([math.cos(start), math.sin(start), 0.0])
     stiff = flagrs.Material(youngs_modulus=1e9, poisson_ratio=0.5, density=1000.0)
@@ -60,8 +60,7 @@ def test_a_stiff_rod_in_shear_turns_as_slender_body_theory_says():
     fluid = OIL.replace(background=flagrs.LinearFlow.shear(rate=1.0))
     simulation = run(flagrs.Scene(rods=bar, fluid=fluid), 2.0)
     angle = math.atan2(*direction(simulation)[1::-1])
-    # Nodal drag lumps half an edge to each end, so that the quadrature of the torque errs by a relative 1/(2 n^2) = 1e-3; it cancels
-    # for a rod that turns rigidly, up to the sum over straining velocities.
+    # The sums over nodes weigh the ends a little differently, by 1e-3.
     assert angle == pytest.approx(math.atan2(1.0, 1.0 / math.tan(start) + 2.0), rel=2e-3)
 
 
@@ -88,7 +87,7 @@ def test_a_background_function_that_fails_says_so():
 
 
 def test_a_magnetised_rod_turns_into_the_field():
-    # A free rigid rod with moment m along its axis: zeta d(angle)/dt = -m B sin(angle), so that tan(angle/2) decays exponentially.
+    # zeta d(angle)/dt = -m B sin(angle): tan(angle / 2) decays exponentially.
     magnetization, field = 1e4, 1e-2
     stiff = flagrs.Material(youngs_modulus=1e9, poisson_ratio=0.5, density=1000.0)
     bar = rod(magnetization=(0.0, 0.0, magnetization)).replace(material=stiff)
@@ -150,7 +149,7 @@ def test_a_torque_spins_a_rod_against_its_twist_drag():
 
 
 def test_a_follower_force_turns_with_the_rod():
-    # Pushed sideways in its material frame at both ends, a stiff rod spins steadily; pushed in the laboratory it would stop.
+    # Pushed sideways in its material frame at both ends, a stiff rod spins steadily.
     stiff = flagrs.Material(youngs_modulus=1e9, poisson_ratio=0.5, density=1000.0)
     bar = flagrs.Rod.straight(
         length=0.1, edge_count=20, radius=1e-3, material=stiff, director=(0.0, 1.0, 0.0)

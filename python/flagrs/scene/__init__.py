@@ -1,6 +1,6 @@
 """The description of what is simulated: frozen, validated parts in SI units, kept in TOML."""
 
-from flagrs.scene.clamp import Clamp
+from flagrs.scene.clamp import Clamp, Rotation
 from flagrs.scene.contact_model import Contact
 from flagrs.scene.flow import FlowFunction, LinearFlow, PoiseuilleFlow
 from flagrs.scene.fluid_model import Fluid
@@ -30,6 +30,7 @@ __all__ = [
     "PointLoad",
     "PoiseuilleFlow",
     "Rod",
+    "Rotation",
     "Scene",
     "Signal",
     "Table",

@@ -60,7 +60,7 @@ def named_function(path: str, function: Any) -> Any:
 
 
 def filled(data: Any, functions: Mapping[str, Any], path: str = "") -> Any:
-    """Return what `plain` gave with `named_function`, with functions replaced by path, or by a word that they are not known."""
+    """Return what `plain` gave with `named_function`, with functions put in by path where they are known."""
     if isinstance(data, dict) and data.keys() == {"function"}:
         return functions[path] if path in functions else Unrecorded(data["function"])
     if isinstance(data, dict):

@@ -13,17 +13,10 @@ from flagrs.errors import SceneError, not_allowed
 from flagrs.scene.part import Part
 from flagrs.scene.signal import CheckedSignal
 from flagrs.scene.values import Array, Bounds, FloatArray, number, origin, read_only
+from flagrs.scene.values import direction as direction_of
 from flagrs.scene.vector_signal import CheckedVectorSignal
 
 _POINT = Annotated[FloatArray, PlainValidator(Array(((3,),), Bounds("m")))]
-
-
-def _unit(value: Any) -> FloatArray:
-    vector = np.array(Array(((3,),), Bounds("1"))(value))
-    norm = float(np.linalg.norm(vector))
-    if norm == 0.0:
-        raise not_allowed("", value, "a vector that is not zero")
-    return read_only(vector / norm)
 
 
 class LinearFlow(Part):
@@ -68,7 +61,7 @@ class LinearFlow(Part):
     @classmethod
     def shear(cls, rate: float, direction: Any = (1, 0, 0), across: Any = (0, 1, 0), **options: Any) -> Self:
         """Return a simple shear: velocity along `direction` that grows by `rate` [1/s] along `across`."""
-        along, normal = _unit(direction), _unit(across)
+        along, normal = direction_of(direction), direction_of(across)
         if abs(float(along @ normal)) > 1e-9:
             raise not_allowed("across", list(across), "perpendicular to direction")
         return cls(gradient=rate * np.outer(along, normal), **options)
@@ -77,8 +70,8 @@ class LinearFlow(Part):
     def extension(
         cls, rate: float, direction: Any = (1, 0, 0), across: Any = (0, 1, 0), **options: Any
     ) -> Self:
-        """Return a plane extension: stretching by `rate` [1/s] along `direction`, shrinking along `across`."""
-        along, normal = _unit(direction), _unit(across)
+        """Return a plane extension: stretching by `rate` [1/s] along `direction`, shrinking `across`."""
+        along, normal = direction_of(direction), direction_of(across)
         if abs(float(along @ normal)) > 1e-9:
             raise not_allowed("across", list(across), "perpendicular to direction")
         return cls(gradient=rate * (np.outer(along, along) - np.outer(normal, normal)), **options)
@@ -109,11 +102,11 @@ class PoiseuilleFlow(Part):
 
     speed: CheckedSignal
     radius: Annotated[float, number(Bounds("m", above=0.0))]
-    direction: Annotated[FloatArray, PlainValidator(_unit)] = Field(
+    direction: Annotated[FloatArray, PlainValidator(direction_of)] = Field(
         default_factory=lambda: read_only(np.array([1.0, 0.0, 0.0]))
     )
     normal: Annotated[
-        FloatArray | None, PlainValidator(lambda value: None if value is None else _unit(value))
+        FloatArray | None, PlainValidator(lambda value: None if value is None else direction_of(value))
     ] = None
     center: _POINT = Field(default_factory=origin)
 
@@ -145,8 +138,8 @@ class CheckedFlow:
             velocities = np.zeros(0)
         if velocities.shape != points.shape or not np.isfinite(velocities).all():
             raise SceneError(
-                f"background flow {self.function!r} at t = {time:g} s: gave shape {np.shape(value)} or values that "
-                f"are not finite; must be finite velocities of shape {points.shape}",
+                f"background flow {self.function!r} at t = {time:g} s: gave shape {np.shape(value)} or "
+                f"values that are not finite; must be finite velocities of shape {points.shape}",
                 value=value,
                 allowed="finite velocities, one row a point",
             )

@@ -1,4 +1,4 @@
-"""Loads: forces and torques on nodes, edges and stretches of a rod, that follow time and may turn with the rod."""
+"""Loads: forces and torques on a rod, that follow time and may turn with the rod."""
 
 from __future__ import annotations
 

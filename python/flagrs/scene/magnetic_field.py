@@ -44,9 +44,7 @@ class MagneticField(Part):
         gradient = self.gradient
         allowed = SOURCE_FREE * float(np.abs(gradient).max())
         if np.abs(gradient - gradient.T).max() > allowed:
-            raise not_allowed(
-                "gradient", gradient.tolist(), "symmetric: a field without currents has no curl"
-            )
+            raise not_allowed("gradient", gradient.tolist(), "symmetric, as without currents")
         if abs(float(np.trace(gradient))) > 3.0 * allowed:
-            raise not_allowed("gradient", gradient.tolist(), "without trace: a magnetic field has no sources")
+            raise not_allowed("gradient", gradient.tolist(), "without trace, as without sources")
         return self

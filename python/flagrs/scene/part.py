@@ -62,6 +62,11 @@ def _key(value: Any) -> Any:
     return value
 
 
+def different(a: Any, b: Any) -> bool:
+    """Return whether two values of fields differ in any bit."""
+    return bool(_key(a) != _key(b))
+
+
 def _scene_error(error: ValidationError, known: list[str]) -> SceneError:
     """Return pydantic's findings as one SceneError with full field paths."""
     return combined(_single_error(details, known) for details in error.errors(include_url=False))

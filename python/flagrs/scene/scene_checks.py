@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagrs.errors import SceneError, faulty, not_allowed
+from flagrs.scene.part import different
 from flagrs.scene.rod_topology import edges_at_nodes
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def _clamps(scene: Scene) -> Iterator[SceneError]:
         field = f"clamps[{position}]"
         for node in clamp.nodes:
             first = nodes.setdefault((clamp.rod, node), position)
-            if (clamp.velocity != scene.clamps[first].velocity).any():
+            if different(clamp.motion(), scene.clamps[first].motion()):
                 yield faulty(
                     f"{field}.nodes", f"node {node} is moved differently by clamps[{first}]", "clamped once"
                 )

@@ -180,6 +180,16 @@ def flag(value: Any) -> bool:
     return bool(value)
 
 
+def direction(value: Any) -> FloatArray:
+    """Return a direction as a read-only unit vector."""
+    vector = np.array(Array(((3,),), Bounds("1"))(value))
+    norm = float(np.linalg.norm(vector))
+    if norm == 0.0:
+        raise not_allowed("", value, "a vector that is not zero")
+    # A unit vector stays what it is to the last bit, so that files give back the same scene.
+    return read_only(vector if abs(norm - 1.0) < 1e-15 else vector / norm)
+
+
 def origin() -> FloatArray:
     """Return the read-only zero vector, the default of fields that hold one."""
     return read_only(np.zeros(3))
