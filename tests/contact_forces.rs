@@ -34,12 +34,8 @@ fn crossed_rods(gap: f64) -> Specification {
         twist_drag: true,
         density: 0.0,
     });
-    specification.clamps = vec![ClampSpecification {
-        nodes: vec![0, 10],
-        edges: vec![],
-        axes: [true; 3],
-        motion: Motion::still(),
-    }];
+    specification.clamps =
+        vec![ClampSpecification { nodes: vec![0, 10], edges: vec![], axes: [true; 3], motion: Motion::still() }];
     specification.contact = Some(ContactSpecification {
         method: ContactMethodSpecification::SpillmannTeschner { tolerance: TOLERANCE, max_iterations: 500 },
         exclusion: std::f64::consts::FRAC_PI_2,

@@ -15,6 +15,7 @@ import scipy.sparse
 from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
 from flagrs.errors import SceneError, not_allowed
+from flagrs.outside_force import ForceFunction, OutsideForce
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
 from flagrs.scene.scene import check_scene
@@ -61,6 +62,13 @@ class Simulation:
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
         of node positions, relative to the size of the filaments (`flagrs.time_step.size`). None: steps of
         `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
+    force
+        A function that gives forces from outside, called once at the beginning of every step with the time
+        [s], nodes (N, 3) [m], velocities (N, 3) [m/s] and directors (E, 3, 3), rows ``m1, m2, t``. It returns
+        forces (N, 3) [N], or a mapping with ``forces`` and, where there are any, ``torques`` (E, 3) on edges
+        [N m] and ``stiffness`` (N, 3, 3) [N/m]: minus the derivative of a node's force with respect to its
+        position, with which stiff springs are followed implicitly. A step that is tried again sees the same
+        forces; steps are of first order. A call costs what Python costs, some 10 us.
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all. Results do not depend on it.
 
@@ -84,6 +92,7 @@ class Simulation:
         scheme: str = "overdamped",
         dt: float | None = None,
         rtol: float | None = None,
+        force: ForceFunction | None = None,
         threads: int | None = None,
     ) -> None:
         check_scene(scene)
@@ -102,6 +111,8 @@ class Simulation:
         self._native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
         self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
         self._restored: Path | None = None
+        if force is not None:
+            self._native.set_force(OutsideForce(force, scene.node_count, scene.edge_count))
         if rtol is not None:
             self._native.set_tolerance(LOCAL_SHARE * rtol * size(scene))
         if scheme == "explicit" and dt is None:

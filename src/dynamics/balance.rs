@@ -23,6 +23,7 @@ use super::statistics::Statistics;
 use crate::elastic::motors::Drive;
 use crate::fluid::FluidModel;
 use crate::fluid::ambient::Ambient;
+use crate::forces::outside::OutsideForce;
 use crate::linear::LinearError;
 use crate::linear::krylov::Gmres;
 use crate::linear::nearly_symmetric::NearlySymmetric;
@@ -44,6 +45,8 @@ pub(super) struct Drives {
     pub inputs: Vec<f64>,
     /// The background flow, where the fluid's geometry is taken.
     pub ambient: Option<Ambient>,
+    /// What a caller's function gave at the beginning of the step.
+    pub outside: Option<Arc<OutsideForce>>,
 }
 
 /// What is given for a step: its length, scheme, and what motors do by its end.
@@ -62,12 +65,14 @@ pub(super) struct Step<'a> {
     pub inputs: Vec<f64>,
     /// The background flow at the end of the step, where the fluid's geometry is taken.
     pub ambient: Option<Ambient>,
+    /// What a caller's function gave at the beginning of the step.
+    pub outside: Option<Arc<OutsideForce>>,
 }
 
 impl<'a> Step<'a> {
     /// A step of the given order, which at most is one more than there are past states.
     pub fn new(scheme: Scheme, state: &'a State, dt: f64, order: usize, drives: Drives) -> Self {
-        let Drives { motor_angles, motor_torques, inputs, ambient } = drives;
+        let Drives { motor_angles, motor_torques, inputs, ambient, outside } = drives;
         let past = &state.history.past;
         let times: Vec<f64> = std::iter::once(state.time + dt).chain(state.history.times(state.time, order)).collect();
         let weights = derivative_weights(&times);
@@ -88,6 +93,7 @@ impl<'a> Step<'a> {
             velocity_drift: difference(&state.velocity, &|k| &past[k].velocity),
             inputs,
             ambient,
+            outside,
         }
     }
 
@@ -145,6 +151,7 @@ pub(super) struct Balance {
     pub(super) fluid: Option<Box<dyn FluidModel>>,
     pub(super) fluid_dofs: Vec<usize>,
     fluid_slots: Vec<[usize; 9]>,
+    node_slots: Vec<[usize; 9]>,
     pub(super) flow: Vec<f64>,
     pub(super) work: super::solve::Work,
     constant: Vec<f64>,
@@ -164,9 +171,8 @@ impl Balance {
         let size = if fluid.as_ref().is_some_and(|fluid| !fluid.is_local()) { 3 * fluid_dofs.len() } else { n };
         let slot =
             |row: usize, column: usize| pattern.slot(row, column).ok_or(LinearError::Singular { what: "sparse" });
-        let fluid_slots = fluid_dofs
-            .iter()
-            .map(|&dof| {
+        let block_slots = |dofs: &[usize]| {
+            let of_node = |&dof: &usize| {
                 let mut slots = [0; 9];
                 for column in 0..3 {
                     for row in 0..3 {
@@ -174,8 +180,11 @@ impl Balance {
                     }
                 }
                 Ok(slots)
-            })
-            .collect::<Result<Vec<_>, LinearError>>()?;
+            };
+            dofs.iter().map(of_node).collect::<Result<Vec<_>, LinearError>>()
+        };
+        let fluid_slots = block_slots(&fluid_dofs)?;
+        let node_slots = block_slots(model.network.node_dofs())?;
         let mut masked = Vec::new();
         for column in 0..n {
             for k in pattern.column_starts()[column]..pattern.column_starts()[column + 1] {
@@ -205,6 +214,7 @@ impl Balance {
             fluid,
             fluid_dofs,
             fluid_slots,
+            node_slots,
             constant: vec![0.0; n],
             contact: vec![0.0; n],
             pool,
@@ -358,6 +368,9 @@ impl Balance {
             barrier.add_forces(law, dofs, q, &increment, &mut self.elastic, &mut self.residual);
             statistics.seconds_contact += start.elapsed().as_secs_f64();
         }
+        if let Some(outside) = &step.outside {
+            outside.add(model.network.node_dofs(), &step.state.q, q, &mut self.residual);
+        }
         self.add_fluid(step, trial)?;
         for (motor, torque) in model.motors.iter().zip(&step.motor_torques) {
             if let Drive::Torque { dof, .. } = motor.drive {
@@ -438,6 +451,13 @@ impl Balance {
             for (slots, block) in self.fluid_slots.iter().zip(fluid.local()) {
                 for (&slot, entry) in slots.iter().zip(block.as_slice()) {
                     self.jacobian[slot] += entry * step.rate;
+                }
+            }
+        }
+        if let Some(outside) = &step.outside {
+            for (slots, block) in self.node_slots.iter().zip(outside.stiffness()) {
+                for (&slot, entry) in slots.iter().zip(block.as_slice()) {
+                    self.jacobian[slot] += entry;
                 }
             }
         }

@@ -19,7 +19,8 @@ use crate::Vec3;
 use crate::contact::spillmann::ContactSolver;
 use crate::elastic::motors::Drive;
 use crate::fluid::ambient::Ambient;
-use crate::rod::configuration::ReferenceFrames;
+use crate::forces::outside::{ForceFunction, OutsideForce, Surroundings};
+use crate::rod::configuration::{Configuration, ReferenceFrames, node};
 
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
@@ -45,6 +46,9 @@ pub struct Simulation {
     trial: Unknowns,
     extrapolated: Vec<f64>,
     pub(super) tolerance: Option<f64>,
+    force: Option<ForceFunction>,
+    /// What the function gave for the step with this number: a step that is tried again sees the same.
+    given: Option<(u64, Arc<OutsideForce>)>,
     positions: Vec<Vec3>,
     stiffness: Vec<f64>,
 }
@@ -69,6 +73,8 @@ impl Simulation {
             work: NewtonWork::new(&trial),
             trial,
             tolerance: None,
+            force: None,
+            given: None,
             extrapolated: state.q.clone(),
             positions: state.positions(&model.network),
             stiffness: Vec::new(),
@@ -127,6 +133,7 @@ impl Simulation {
         }
         self.state = state;
         self.fluid_step = None;
+        self.given = None;
     }
 
     /// As [`Self::restore`], for a state from elsewhere.
@@ -237,7 +244,8 @@ impl Simulation {
 
     /// Tries one step of the given length and order; whether it was accepted.
     pub(super) fn try_step(&mut self, dt: f64, order: usize) -> Result<bool, TryError> {
-        let order = order.min(self.state.history.past.len() + 1);
+        // Forces of a step's beginning are right to first order, and only the first order's estimate sees what they leave out.
+        let order = if self.force.is_some() { 1 } else { order.min(self.state.history.past.len() + 1) };
         let (t0, t1) = (self.state.time, self.state.time + dt);
         let mut trial = std::mem::take(&mut self.trial);
         let prepared = self.prepare(&mut trial, t0, t1);
@@ -262,8 +270,38 @@ impl Simulation {
         Ok(accepted)
     }
 
+    /// Asks a function for forces at the beginning of every step.
+    pub fn set_force(&mut self, force: Option<ForceFunction>) {
+        self.force = force;
+        self.given = None;
+    }
+
+    fn outside_force(&mut self) -> Result<Option<Arc<OutsideForce>>, TryError> {
+        let Some(force) = &self.force else { return Ok(None) };
+        if let Some((_, given)) = self.given.as_ref().filter(|(steps, _)| *steps == self.state.steps) {
+            return Ok(Some(Arc::clone(given)));
+        }
+        let (network, state) = (&self.model.network, &self.state);
+        let mut configuration = Configuration::new(network, self.model.dof_count);
+        configuration.update(network, &state.q, &state.frames, &self.model.shafts(&state.motor_angles, &state.q));
+        let directors = (0..network.edges().len()).map(|edge| {
+            let [m1, m2] = configuration.material(edge);
+            [m1, m2, configuration.tangent(edge)]
+        });
+        let given = force(&Surroundings {
+            time: state.time,
+            nodes: state.positions(network),
+            velocities: network.node_dofs().iter().map(|&dof| node(&state.velocity, dof)).collect(),
+            directors: directors.collect(),
+        })?;
+        let outside = Arc::new(OutsideForce::new(network, &configuration, &given)?);
+        self.given = Some((state.steps, Arc::clone(&outside)));
+        Ok(Some(outside))
+    }
+
     /// Motor angles and torques at the end of the step; the guess, with the prescribed degrees of freedom set.
-    fn prepare(&self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<Drives, TryError> {
+    fn prepare(&mut self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<Drives, TryError> {
+        let outside = self.outside_force()?;
         let mut angles = self.state.motor_angles.clone();
         let mut torques = vec![0.0; angles.len()];
         for (k, motor) in self.model.motors.iter().enumerate() {
@@ -281,7 +319,7 @@ impl Simulation {
             clamp.advance((t0, &state.q), &state.frames, t1, &mut guess.q)?;
         }
         let inputs = self.model.inputs.values(t1)?;
-        Ok(Drives { motor_angles: angles, motor_torques: torques, inputs, ambient: None })
+        Ok(Drives { motor_angles: angles, motor_torques: torques, inputs, ambient: None, outside })
     }
 
     /// Solves the step from the guess, contact included; the motor angles at its end.

@@ -137,9 +137,9 @@ fn callable(function: Py<PyAny>) -> FlowFunction {
             let rows: Vec<Vec<f64>> = points.iter().map(|point| point.as_slice().to_vec()).collect();
             let array = PyArray2::from_vec2(py, &rows)?;
             let result = function.call1(py, (array, time))?;
-            let velocities: PyReadonlyArray2<'_, f64> = result.extract(py).map_err(|_| {
-                PyValueError::new_err("the background flow must return an array (M, 3) of float64")
-            })?;
+            let velocities: PyReadonlyArray2<'_, f64> = result
+                .extract(py)
+                .map_err(|_| PyValueError::new_err("the background flow must return an array (M, 3) of float64"))?;
             let velocities = velocities.as_array();
             if velocities.shape() != [points.len(), 3] {
                 let shape = velocities.shape();

@@ -2,6 +2,7 @@
 //!
 //! * [`specification`]: a scene's plain data from a mapping of arrays.
 //! * [`simulation`]: the simulation class.
+//! * [`force`]: a function that is asked for forces.
 //! * [`loads`]: loads, magnetism and background flows from mappings.
 //! * [`far_field`]: the product with the mobility without its matrix.
 //! * [`numerics`]: mobility, velocity and distances on plain arrays.
@@ -11,6 +12,7 @@
 mod arrays;
 mod errors;
 mod far_field;
+mod force;
 mod loads;
 mod numerics;
 mod simulation;

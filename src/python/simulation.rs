@@ -41,6 +41,11 @@ impl Simulation {
         Ok(Self { inner })
     }
 
+    /// Asks a function for forces at the beginning of every step; None: no longer.
+    fn set_force(&mut self, function: Option<Py<PyAny>>) {
+        self.inner.set_force(function.map(super::force::force_function));
+    }
+
     fn __repr__(&self) -> String {
         let network = self.inner.model().network();
         format!(

@@ -9,8 +9,8 @@ use flagrs::dynamics::specification::{
     HeadSpecification, MotorSpecification, Specification,
 };
 use flagrs::elastic::signal::Signal;
-use flagrs::kinematics::clamp::Motion;
 use flagrs::fluid::product::FarFieldChoice;
+use flagrs::kinematics::clamp::Motion;
 
 /// Least arc length of an edge of the flagella, m.
 const EDGE_LENGTH: f64 = 5e-3;
