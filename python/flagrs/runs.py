@@ -107,7 +107,7 @@ def run_to_file(
         simulation = Simulation.restore(path)
         resumed_at = float(simulation.time)
     else:
-        simulation = Simulation(scene, settings.scheme, settings.dt, settings.rtol, settings.threads)
+        simulation = Simulation(scene, settings.scheme, settings.dt, settings.rtol, threads=settings.threads)
         resumed_at = None
     trajectory = simulation.run(settings.until, settings.save_every, path=path, progress=progress)
     return Run(trajectory, resumed_at)

@@ -14,7 +14,7 @@ import scipy.sparse
 
 from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
-from flagrs.errors import SceneError, not_allowed
+from flagrs.errors import FlagrsError, SceneError, not_allowed
 from flagrs.outside_force import ForceFunction, OutsideForce
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
@@ -109,7 +109,8 @@ class Simulation:
         _check_scheme(scene, scheme)
         self._scene = scene
         self._native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
-        self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
+        recorded = None if force is None else repr(force)
+        self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads, "force": recorded}
         self._restored: Path | None = None
         if force is not None:
             self._native.set_force(OutsideForce(force, scene.node_count, scene.edge_count))
@@ -119,7 +120,9 @@ class Simulation:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
 
     @classmethod
-    def restore(cls, path: str | Path, scene: Scene | None = None) -> Self:
+    def restore(
+        cls, path: str | Path, scene: Scene | None = None, force: ForceFunction | None = None
+    ) -> Self:
         """Return the simulation at the checkpoint in a file; it goes on to the last bit.
 
         Parameters
@@ -128,6 +131,8 @@ class Simulation:
             A file written by `checkpoint` or `run`, also of a run that was killed.
         scene
             The scene; needed only if Python functions drive it, which no file can hold.
+        force
+            The force function of the run, if it had one.
 
         Raises
         ------
@@ -135,7 +140,11 @@ class Simulation:
             If the file holds no checkpoint, or one of another scene.
         """
         saved = load_checkpoint(path, scene)
-        simulation = cls(saved.scene, **saved.settings)
+        recorded = saved.settings.pop("force", None)
+        if (recorded is None) != (force is None):
+            told = "had no force function" if recorded is None else f"had the force function {recorded}"
+            raise FlagrsError(f"{path}: the run {told}; give force= just as it was")
+        simulation = cls(saved.scene, **saved.settings, force=force)
         simulation.load_state(saved.state)
         simulation._restored = Path(path)
         return simulation

@@ -1,0 +1,23 @@
+"""A force of one's own at every step: the end of a rod in an optical trap that moves."""
+
+import flagrs
+import numpy as np
+
+SPRING = 5e-3  # N/m
+soft = flagrs.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+rod = flagrs.Rod.straight(length=0.05, edge_count=20, radius=0.5e-3, material=soft)
+scene = flagrs.Scene(rods=rod, fluid=flagrs.Fluid(viscosity=0.1))
+
+
+def trap(time, nodes, velocities, directors):
+    """Pull the last node to a point that moves across; with the spring's stiffness it is followed implicitly."""
+    forces, stiffness = np.zeros_like(nodes), np.zeros((len(nodes), 3, 3))
+    forces[-1] = SPRING * (rod.nodes[-1] + [0.0, 2e-3 * time, 0.0] - nodes[-1])
+    stiffness[-1] = SPRING * np.eye(3)
+    return {"forces": forces, "stiffness": stiffness}
+
+
+simulation = flagrs.Simulation(scene, rtol=1e-3, force=trap)
+trajectory = simulation.run(until=5.0, save_every=0.5, path=False)
+behind = 2e-3 * 5.0 - (trajectory.nodes[-1, -1, 1] - rod.nodes[-1, 1])
+print(f"the end follows the trap {1e3 * behind:.2f} mm behind it, pulled by {1e6 * SPRING * behind:.2f} uN")
