@@ -1,6 +1,6 @@
 //! Everything about a trial state that several terms need, computed once per evaluation and without allocation.
 
-use super::frames::{Holonomy, orthonormalised, reference_twist, transport_through};
+use super::frames::{FOLDED, Holonomy, one_plus_cosine, orthonormalised, reference_twist, transport_through};
 use super::network::Network;
 use super::strain::{EdgeFrame, HingeStrain};
 use crate::Vec3;
@@ -168,32 +168,36 @@ impl Configuration {
             self.directors[k] = director;
             self.material[k] = [director * cosine + second * sine, second * cosine - director * sine];
             self.holonomies[k] =
-                if *old == t || 1.0 + old.dot(&t) < 1e-4 { Holonomy::NONE } else { Holonomy::new(old, &t, length) };
+                if *old == t || one_plus_cosine(old, &t) < FOLDED { Holonomy::NONE } else { Holonomy::new(old, &t, length) };
         }
-        for (k, hinge) in network.hinges().iter().enumerate() {
-            let [e, f] = hinge.edges;
-            let [se, sf] = hinge.signs;
-            let frame_e = self.frame(e, se);
-            let frame_f = self.frame(f, sf);
-            if 1.0 + frame_e.t.dot(&frame_f.t) < 1e-10 {
+        for k in 0..network.hinges().len() {
+            let [e, f] = self.hinge_frames(network, k);
+            if one_plus_cosine(&e.t, &f.t) < FOLDED {
                 return false;
             }
-            self.twists[k] =
-                reference_twist(&self.directors[e], &frame_e.t, &self.directors[f], &frame_f.t, reference.twists[k]);
-            let theta = |edge: usize, sign: f64| sign * q[network.edge_dofs()[edge]];
-            let tau = theta(f, sf) - theta(e, se) + self.twists[k];
-            self.strains[k] = HingeStrain::new(frame_e, frame_f, tau);
+            let hinge = network.hinges()[k];
+            let [director_e, director_f] = hinge.edges.map(|edge| self.directors[edge]);
+            self.twists[k] = reference_twist(&director_e, &e.t, &director_f, &f.t, reference.twists[k]);
+            let theta = |side: usize| hinge.signs[side] * q[network.edge_dofs()[hinge.edges[side]]];
+            self.strains[k] = HingeStrain::new(e, f, theta(1) - theta(0) + self.twists[k]);
         }
         for shaft in shafts {
-            let HingeStrain { mut e, mut f, tau, .. } = self.strains[shaft.hinge];
-            if shaft.second {
-                f = turned(&f, -shaft.angle);
+            let [e, f] = self.hinge_frames(network, shaft.hinge);
+            let tau = self.strains[shaft.hinge].tau - shaft.angle;
+            self.strains[shaft.hinge] = if shaft.second {
+                HingeStrain::new(e, f.turned((-shaft.angle).sin_cos()), tau)
             } else {
-                e = turned(&e, shaft.angle);
-            }
-            self.strains[shaft.hinge] = HingeStrain::new(e, f, tau - shaft.angle);
+                HingeStrain::new(e.turned(shaft.angle.sin_cos()), f, tau)
+            };
         }
         true
+    }
+
+    /// Material frames of a hinge's two edges as the hinge sees them.
+    #[inline]
+    fn hinge_frames(&self, network: &Network, hinge: usize) -> [EdgeFrame; 2] {
+        let hinge = network.hinges()[hinge];
+        [self.frame(hinge.edges[0], hinge.signs[0]), self.frame(hinge.edges[1], hinge.signs[1])]
     }
 
     fn frame(&self, edge: usize, sign: f64) -> EdgeFrame {
@@ -242,11 +246,6 @@ impl Configuration {
         reference.directors.copy_from_slice(&self.directors);
         reference.twists.copy_from_slice(&self.twists);
     }
-}
-
-fn turned(frame: &EdgeFrame, angle: f64) -> EdgeFrame {
-    let (sine, cosine) = angle.sin_cos();
-    EdgeFrame { m1: frame.m1 * cosine + frame.m2 * sine, m2: frame.m2 * cosine - frame.m1 * sine, ..*frame }
 }
 
 /// Reads three consecutive coordinates.
