@@ -1,8 +1,8 @@
 """Gradient and Hessian of a chain's elastic energy in NumPy, all hinges at once.
 
-The formulas are those of docs/theory ("Strains"), with curvature in the frame halfway through the twist. Frames
-are transported in time from the reference; the Hessian is exact where the chain stands at its reference
-frames.
+The formulas are those of docs/theory ("Strains"), with curvature in the frame halfway through the twist.
+Frames are transported in time from the reference; the Hessian is exact where the chain stands at its
+reference frames.
 """
 
 from __future__ import annotations
@@ -174,7 +174,13 @@ def _bending_and_twisting(
             hessian[:, angle, start : start + 3] += column[:, start : start + 3]
         hessian[:, angle, 3] += column[:, 3]
         hessian[:, angle, 7] += column[:, 7]
-    block = wide - _outer(across_f, mean_t) + _outer(mean_t, across_e) - _skew(mean) + 2.0 * _outer(kb, with_twist)
+    block = (
+        wide
+        - _outer(across_f, mean_t)
+        + _outer(mean_t, across_e)
+        - _skew(mean)
+        + 2.0 * _outer(kb, with_twist)
+    )
     block -= (identity + _outer(te, tf)) * (weighted / chi_3)
     block += 0.5 * w3[:, :, None] * (_skew(te) * (2.0 / chi_3) - _outer(kb, mean_t))
     block /= (length_e * length_f)[:, :, None]

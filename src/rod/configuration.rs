@@ -2,99 +2,9 @@
 
 use super::frames::{FOLDED, Holonomy, one_plus_cosine, orthonormalised, reference_twist, transport_through};
 use super::network::Network;
+use super::reference::ReferenceFrames;
 use super::strain::{EdgeFrame, HingeStrain};
 use crate::Vec3;
-
-/// Frames of the last accepted state, from which trial states are transported in time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReferenceFrames {
-    /// Unit tangent of every edge.
-    pub tangents: Vec<Vec3>,
-    /// First reference director of every edge.
-    pub directors: Vec<Vec3>,
-    /// Reference twist of every hinge, continued through whole turns, rad.
-    pub twists: Vec<f64>,
-}
-
-impl ReferenceFrames {
-    /// Frames of a shape: on every connected part the first edge's director is transported in space along the hinges.
-    ///
-    /// `first` gives that director (its part normal to the edge counts). Without it the director is the curvature binormal
-    /// at the first bent hinge met, transported back, so that a rotated scene has rotated frames; a straight part takes any
-    /// perpendicular.
-    pub fn of_shape(network: &Network, nodes: &[Vec3], first: &dyn Fn(usize) -> Option<Vec3>) -> Self {
-        let tangents: Vec<Vec3> = network.edges().iter().map(|&[i, j]| (nodes[j] - nodes[i]).normalize()).collect();
-        let mut meeting = vec![Vec::new(); tangents.len()];
-        for hinge in network.hinges() {
-            let [e, f] = hinge.edges;
-            let sign = hinge.signs[0] * hinge.signs[1];
-            meeting[e].push((f, sign));
-            meeting[f].push((e, sign));
-        }
-        let mut directors: Vec<Option<Vec3>> = vec![None; tangents.len()];
-        for root in 0..tangents.len() {
-            if directors[root].is_some() {
-                continue;
-            }
-            let t = tangents[root];
-            let seed = first(root).or_else(|| binormal_seen_from(root, &meeting, &tangents));
-            let seed = seed.map(|d| d - t * d.dot(&t)).filter(|d| d.norm() > 0.0);
-            directors[root] = Some(seed.map_or_else(|| super::frames::any_perpendicular(&t), |d| d.normalize()));
-            let mut queue = std::collections::VecDeque::from([root]);
-            while let Some(edge) = queue.pop_front() {
-                let Some(director) = directors[edge] else {
-                    continue;
-                };
-                for &(other, sign) in &meeting[edge] {
-                    if directors[other].is_none() {
-                        // A reversed edge keeps its first director, and its tangent changes sign.
-                        let moved = transport_through(&director, &(tangents[edge] * sign), &tangents[other]);
-                        directors[other] = Some(orthonormalised(&moved, &tangents[other]));
-                        queue.push_back(other);
-                    }
-                }
-            }
-        }
-        let mut frames = Self {
-            directors: directors.into_iter().flatten().collect(),
-            tangents,
-            twists: vec![0.0; network.hinges().len()],
-        };
-        for (k, hinge) in network.hinges().iter().enumerate() {
-            let [e, f] = hinge.edges;
-            frames.twists[k] = reference_twist(
-                &frames.directors[e],
-                &(frames.tangents[e] * hinge.signs[0]),
-                &frames.directors[f],
-                &(frames.tangents[f] * hinge.signs[1]),
-                0.0,
-            );
-        }
-        frames
-    }
-}
-
-/// Turning angles below this count as straight: the binormal's direction would be round-off.
-const STRAIGHT: f64 = 1e-6;
-
-fn binormal_seen_from(root: usize, meeting: &[Vec<(usize, f64)>], tangents: &[Vec3]) -> Option<Vec3> {
-    let mut seen = vec![false; tangents.len()];
-    let mut queue = std::collections::VecDeque::from([root]);
-    seen[root] = true;
-    while let Some(edge) = queue.pop_front() {
-        for &(other, sign) in &meeting[edge] {
-            let binormal = (tangents[edge] * sign).cross(&tangents[other]);
-            if binormal.norm() > STRAIGHT {
-                return Some(transport_through(&binormal.normalize(), &tangents[edge], &tangents[root]));
-            }
-            if !seen[other] {
-                seen[other] = true;
-                queue.push_back(other);
-            }
-        }
-    }
-    None
-}
 
 /// The angle by which a motor has turned the shaft edge of a hinge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,8 +77,11 @@ impl Configuration {
             self.tangents[k] = t;
             self.directors[k] = director;
             self.material[k] = [director * cosine + second * sine, second * cosine - director * sine];
-            self.holonomies[k] =
-                if *old == t || one_plus_cosine(old, &t) < FOLDED { Holonomy::NONE } else { Holonomy::new(old, &t, length) };
+            self.holonomies[k] = if *old == t || one_plus_cosine(old, &t) < FOLDED {
+                Holonomy::NONE
+            } else {
+                Holonomy::new(old, &t, length)
+            };
         }
         for k in 0..network.hinges().len() {
             let [e, f] = self.hinge_frames(network, k);
