@@ -63,7 +63,8 @@ class Rod(Part):
     GJ : float, ndarray or None
         Twisting stiffness, one or (H,) [N m^2]; None: G pi r^4 / 2.
     natural_curvature : ndarray or None
-        Integrated natural curvature (2,) or (H, 2) at the hinges [1]; None: that of the rest shape.
+        Integrated natural curvature (2,) or (H, 2) at the hinges, in the material frame halfway between the
+        two edges [1]; None: that of the rest shape.
     natural_twist : float, ndarray or None
         Natural twist at the hinges, one or (H,) [rad]; None: that of the rest shape.
     theta : ndarray or None
