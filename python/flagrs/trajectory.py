@@ -80,9 +80,22 @@ class Trajectory:
         contents = trajectory_file.read(Path(path))
         return cls(contents, recorded_scene(contents), Path(path))
 
-    def save(self, path: str | Path) -> None:
-        """Write the trajectory to a file, with its last checkpoint if it has one."""
-        trajectory_file.write_whole(Path(path), self._contents)
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write the trajectory to a file, with its last checkpoint if it has one.
+
+        Parameters
+        ----------
+        path
+            The file.
+        overwrite
+            Whether one that is there already is replaced.
+
+        Raises
+        ------
+        FileError
+            If it is there already, is written by a run, or cannot be written; an `OSError`.
+        """
+        trajectory_file.write_whole(Path(path), self._contents, overwrite)
 
     @property
     def has_checkpoint(self) -> bool:
