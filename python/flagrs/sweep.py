@@ -107,8 +107,8 @@ def run(
     progress
         Whether to show a progress bar.
 
-    Ending the iteration early, as Ctrl-C does, stops the workers within a second or two: no new case begins, and
-    what was running is saved and goes on in the next sweep.
+    Ending the iteration early, as Ctrl-C does, stops the workers within a second or two: no new case begins,
+    and what was running is saved and goes on in the next sweep.
 
     Raises
     ------

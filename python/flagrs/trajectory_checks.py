@@ -197,13 +197,14 @@ def _contents(file: h5py.File, size: int) -> Raw:
         raise Damaged(f"damaged: no {', '.join(sorted(missing))}")
     if version > FORMAT_VERSION:
         raise Damaged(f"written by a newer flagrs, {manifest['version'][:40]}")
+    # The count first: what a running simulation adds while the rest is read lies beyond it.
+    count = int(_number(file, "count", size))
+    wall, finished = float(_number(file, "wall_seconds", size)), bool(_number(file, "finished", size))
     names = {group: _names(file, group) for group in ("frames", "signals")}
     if version > 1 and _text(file, "manifest_sum") != manifest_sum(manifest, names):
         raise Damaged("changed since it was written: the manifest's checksum does not match")
     frames = {name: _numbers(file, f"frames/{name}", "f8", size) for name in names["frames"]}
     signals = {name: _numbers(file, f"signals/{name}", "f8", size) for name in names["signals"]}
-    count = int(_number(file, "count", size))
-    wall, finished = float(_number(file, "wall_seconds", size)), bool(_number(file, "finished", size))
     if version > 1:
         sums = _numbers(file, "sums", "u8", size)
         whole = min(len(sums), *(len(array) for array in [*frames.values(), *signals.values()]))

@@ -4,8 +4,8 @@ The structure is laid out in a temporary file that then takes the final name, an
 added (`trajectory_writer`) in HDF5's single-writer-multiple-reader (SWMR) mode, in which the file is
 consistent at every instant. SWMR forbids new objects, so everything that may come later has its place from
 the start: a count of the frames that are complete, written after them, and two slots for checkpoints, used
-in turn, so that one is always whole. Frames, manifest, count and checkpoints have checksums of their own, and a file that was
-closed ends in a digest of all its bytes (`trajectory_checks`).
+in turn, so that one is always whole. Frames, manifest, count and checkpoints have checksums of their own,
+and a file that was closed ends in a digest of all its bytes (`trajectory_checks`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A worker process of a sweep: it stops when it is told to, and does not outlive the process that started it."""
+"""A worker process of a sweep: it stops when told to, and does not outlive the process that started it."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def start(line: Connection) -> None:
     Parameters
     ----------
     line
-        The reading end of a pipe whose other end only the parent has: it closes when the parent says stop, and
-        when it dies.
+        The reading end of a pipe whose other end only the parent has: it closes when the parent says stop,
+        and when it dies.
     """
     # Ctrl-C goes to the whole group of processes; the parent alone decides what follows from it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -18,18 +18,18 @@ impl State {
     /// [`ModelError::Length`] or [`ModelError::Value`] naming the first field that is wrong.
     pub fn check(&self, model: &Model, like: &Self) -> Result<(), ModelError> {
         let (dofs, flow) = (like.q.len(), like.density.len());
-        finite("time", &[self.time])?;
-        range("steps", self.steps as f64, self.steps <= MOST_STEPS, "at most 2^62")?;
-        vector("q", &self.q, dofs)?;
-        vector("velocity", &self.velocity, dofs)?;
-        vector("density", &self.density, flow)?;
-        vector("tensions", &self.tensions, like.tensions.len())?;
-        vector("motor_angles", &self.motor_angles, like.motor_angles.len())?;
-        vector("twists", &self.frames.twists, like.frames.twists.len())?;
+        finite("state.time", &[self.time])?;
+        range("state.steps", self.steps as f64, self.steps <= MOST_STEPS, "at most 2^62")?;
+        vector("state.q", &self.q, dofs)?;
+        vector("state.velocity", &self.velocity, dofs)?;
+        vector("state.density", &self.density, flow)?;
+        vector("state.tensions", &self.tensions, like.tensions.len())?;
+        vector("state.motor_angles", &self.motor_angles, like.motor_angles.len())?;
+        vector("state.twists", &self.frames.twists, like.frames.twists.len())?;
         let dt = self.control.dt;
-        range("control_step", dt, dt.is_finite() && dt >= 0.0, "a finite time >= 0 s")?;
+        range("state.control_step", dt, dt.is_finite() && dt >= 0.0, "a finite time >= 0 s")?;
         let order = self.control.order;
-        range("control_order", order as f64, (1..=HIGHEST_ORDER).contains(&order), "1, 2 or 3")?;
+        range("state.control_order", order as f64, (1..=HIGHEST_ORDER).contains(&order), "1, 2 or 3")?;
         self.check_history(dofs, flow)?;
         self.check_frames(like)?;
         self.check_contacts(model)
@@ -37,29 +37,34 @@ impl State {
 
     fn check_history(&self, dofs: usize, flow: usize) -> Result<(), ModelError> {
         let (past, order) = (&self.history.past, self.history.order);
-        range("history_times", past.len() as f64, past.len() <= DEPTH, "at most 4 past states")?;
-        range("history_order", order as f64, order <= GUESS_ORDER.min(past.len()), "0 to 3, no more than past states")?;
+        range("state.history_times", past.len() as f64, past.len() <= DEPTH, "at most 4 past states")?;
+        range(
+            "state.history_order",
+            order as f64,
+            order <= GUESS_ORDER.min(past.len()),
+            "0 to 3, no more than past states",
+        )?;
         let mut later = self.time;
         for sample in past {
-            finite("history_times", &[sample.time])?;
-            range("history_times", sample.time, sample.time < later, "earlier than the state after it")?;
+            finite("state.history_times", &[sample.time])?;
+            range("state.history_times", sample.time, sample.time < later, "earlier than the state after it")?;
             later = sample.time;
-            vector("history_states", &sample.q, dofs)?;
-            vector("history_velocities", &sample.velocity, dofs)?;
-            vector("history_densities", &sample.density, flow)?;
+            vector("state.history_states", &sample.q, dofs)?;
+            vector("state.history_velocities", &sample.velocity, dofs)?;
+            vector("state.history_densities", &sample.density, flow)?;
         }
         Ok(())
     }
 
     fn check_frames(&self, like: &Self) -> Result<(), ModelError> {
         let (tangents, directors) = (&self.frames.tangents, &self.frames.directors);
-        length("tangents", tangents.len(), like.frames.tangents.len())?;
-        length("directors", directors.len(), like.frames.directors.len())?;
+        length("state.tangents", tangents.len(), like.frames.tangents.len())?;
+        length("state.directors", directors.len(), like.frames.directors.len())?;
         for (tangent, director) in tangents.iter().zip(directors) {
-            unit("tangents", tangent)?;
-            unit("directors", director)?;
+            unit("state.tangents", tangent)?;
+            unit("state.directors", director)?;
             let product = tangent.dot(director);
-            range("directors", product, product.abs() <= FRAME_TOLERANCE, "at right angles to their tangents")?;
+            range("state.directors", product, product.abs() <= FRAME_TOLERANCE, "at right angles to their tangents")?;
         }
         Ok(())
     }
@@ -69,19 +74,19 @@ impl State {
         for &([first, second], force) in &self.contacts {
             for body in [first, second] {
                 let known = (body as usize) < bodies;
-                range("contact_pairs", f64::from(body), known, "indices of edges, or of the head after them")?;
+                range("state.contact_pairs", f64::from(body), known, "indices of edges, or of the head after them")?;
             }
-            finite("contact_forces", &[force])?;
+            finite("state.contact_forces", &[force])?;
         }
         if !self.contact_anchor.is_empty() {
-            length("contact_anchor", self.contact_anchor.len(), model.network().node_count())?;
+            length("state.contact_anchor", self.contact_anchor.len(), model.network().node_count())?;
         }
-        self.contact_anchor.iter().try_for_each(|anchor| finite("contact_anchor", anchor.as_slice()))
+        self.contact_anchor.iter().try_for_each(|anchor| finite("state.contact_anchor", anchor.as_slice()))
     }
 }
 
 fn range(field: &str, value: f64, holds: bool, allowed: &'static str) -> Result<(), ModelError> {
-    if holds { Ok(()) } else { Err(ModelError::Value { field: format!("state.{field}"), value, allowed }) }
+    if holds { Ok(()) } else { Err(ModelError::Value { field: field.to_owned(), value, allowed }) }
 }
 
 fn finite(field: &str, values: &[f64]) -> Result<(), ModelError> {
