@@ -14,7 +14,7 @@ import scipy.sparse
 
 from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
-from flagrs.errors import FlagrsError, SceneError, not_allowed
+from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.frame_times import check_frames, frame_times
@@ -130,7 +130,10 @@ class Simulation:
             If the file holds no checkpoint, or one of another scene.
         """
         saved = load_checkpoint(path, scene)
-        simulation = cls(saved.scene, **saved.settings)
+        try:
+            simulation = cls(saved.scene, **saved.settings)
+        except TypeError as error:
+            raise FileError(path, f"damaged: its settings ({error})") from None
         simulation.load_state(saved.state)
         simulation._restored = Path(path)
         return simulation
