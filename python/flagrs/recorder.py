@@ -128,6 +128,7 @@ class Recorder:
         self._functions = codec.functions_of(scene)
         self._waiting: list[tuple[dict[str, FloatArray], dict[str, float]]] = []
         self._waiting_since = time.perf_counter()
+        self._began = self._waiting_since - contents.wall_seconds
         times = contents.frames["time"]
         self._last_time = float(times[-1]) if len(times) else -np.inf
         self._count = len(times)
@@ -200,6 +201,9 @@ class Recorder:
         finally:
             if self._writer is not None:
                 self._writer.close(finished)
+            else:
+                self._contents.finished = finished
+                self._contents.wall_seconds = time.perf_counter() - self._began
 
     def trajectory(self) -> Trajectory:
         """Return what was recorded."""

@@ -18,6 +18,7 @@ from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.frame_times import check_frames, frame_times
+from flagrs.memory import require_memory
 from flagrs.progress import bar_for
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
@@ -91,6 +92,11 @@ class Simulation:
         threads: int | None = None,
     ) -> None:
         check_scene(scene)
+        require_memory(
+            f"a simulation of {scene.node_count} nodes",
+            scene.plan().memory,
+            "take longer edges, or leave Fluid.far_field_nodes as it is",
+        )
         if rtol is not None:
             number("rtol", rtol, Bounds("1", at_least=1e-8, at_most=0.1))
         if rtol is not None and scheme == "explicit":
@@ -369,6 +375,11 @@ class Simulation:
         ``resistance() @ velocities.ravel()`` is the force that drags the nodes at these velocities; twist
         drag and head are not in it.
         """
+        require_memory(
+            f"the resistance of {self._scene.node_count} nodes",
+            3 * 72.0 * self._scene.node_count**2,
+            "there is no smaller form of it; simulations of large scenes never form it",
+        )
         return self._native.resistance()
 
     def stable_step(self) -> float:
