@@ -1,7 +1,7 @@
 """Soft helical filaments swimming at low Reynolds number: discrete elastic rods in Stokes flow."""
 
 from flagrs import contact, fluid, scenarios
-from flagrs.errors import ConvergenceError, FlagrsError, SceneError
+from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError
 from flagrs.scene import (
     Clamp,
     Contact,
@@ -18,11 +18,15 @@ from flagrs.simulation import Simulation
 from flagrs.suggest import Suggestion, suggest
 from flagrs.trajectory import Trajectory
 from flagrs.units import rpm
+from flagrs.version import installed_version
+
+__version__ = installed_version()
 
 __all__ = [
     "Clamp",
     "Contact",
     "ConvergenceError",
+    "FileError",
     "FlagrsError",
     "Fluid",
     "Head",
@@ -36,6 +40,7 @@ __all__ = [
     "Suggestion",
     "Table",
     "Trajectory",
+    "__version__",
     "contact",
     "fluid",
     "rpm",

@@ -11,7 +11,8 @@ from typing import Any, Self
 import numpy as np
 
 from flagrs import trajectory_file
-from flagrs.errors import FlagrsError
+from flagrs.errors import FileError, FlagrsError
+from flagrs.frame import shapes_of
 from flagrs.measures import angle_about, slope, window
 from flagrs.scene import Head, Motor, Scene, Table, codec
 from flagrs.scene.rod_topology import edges_at_nodes, far_end
@@ -76,13 +77,40 @@ class Trajectory:
         """Return the trajectory in a file, whether its run finished, goes on, or was killed.
 
         Signals that were Python functions come back as tables of their values at the frames.
+
+        Raises
+        ------
+        FileError
+            If the file is missing, cannot be read, has changed since it was written, or is no trajectory; an
+            `OSError`.
         """
         contents = trajectory_file.read(Path(path))
-        return cls(contents, recorded_scene(contents), Path(path))
+        try:
+            scene = recorded_scene(contents)
+            trajectory = cls(contents, scene, Path(path))
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            raise FileError(path, f"damaged: its scene or settings ({error})") from None
+        wrong = [name for name, shape in shapes_of(scene).items() if contents.frames[name].shape[1:] != shape]
+        if wrong:
+            raise FileError(path, f"damaged: {', '.join(wrong)} do not fit its scene")
+        return trajectory
 
-    def save(self, path: str | Path) -> None:
-        """Write the trajectory to a file, with its last checkpoint if it has one."""
-        trajectory_file.write_whole(Path(path), self._contents)
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write the trajectory to a file, with its last checkpoint if it has one.
+
+        Parameters
+        ----------
+        path
+            The file.
+        overwrite
+            Whether one that is there already is replaced.
+
+        Raises
+        ------
+        FileError
+            If it is there already, is written by a run, or cannot be written; an `OSError`.
+        """
+        trajectory_file.write_whole(Path(path), self._contents, overwrite)
 
     @property
     def has_checkpoint(self) -> bool:

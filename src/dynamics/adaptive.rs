@@ -67,6 +67,7 @@ impl Simulation {
                     return Ok(());
                 }
                 Ok(false) => self.statistics.rejected_steps += 1,
+                Err(TryError::Interrupted) => return Err(StepError::Interrupted),
                 Err(TryError::Signal(error)) => return Err(StepError::Signal(error)),
                 Err(TryError::Solve { residual, iterations, worst, reason }) => {
                     self.statistics.rejected_steps += 1;

@@ -9,17 +9,16 @@
 //!
 //! so that no dense matrix is ever factored. How the linear systems are solved is told in `solve.rs`.
 
-use std::sync::Arc;
 use std::time::Instant;
 
-use rayon::ThreadPool;
-
 use super::barrier_term::BarrierTerm;
+use super::interrupt::Interrupt;
 use super::model::Model;
 use super::predictor::derivative_weights;
 use super::scheme::Scheme;
 use super::state::State;
 use super::statistics::Statistics;
+use super::threads::Threads;
 use crate::elastic::motors::Drive;
 use crate::fluid::FluidModel;
 use crate::linear::LinearError;
@@ -132,11 +131,12 @@ pub(super) struct Balance {
     pub(super) work: super::solve::Work,
     constant: Vec<f64>,
     contact: Vec<f64>,
-    pub(super) pool: Option<Arc<ThreadPool>>,
+    pub(super) threads: Threads,
+    pub(super) interrupt: Interrupt,
 }
 
 impl Balance {
-    pub fn new(model: &Model, pool: Option<Arc<ThreadPool>>) -> Result<Self, LinearError> {
+    pub fn new(model: &Model, threads: Threads) -> Result<Self, LinearError> {
         let n = model.dof_count;
         let pattern = &model.pattern;
         let fluid = model.fluid()?;
@@ -190,7 +190,8 @@ impl Balance {
             fluid_slots,
             constant: vec![0.0; n],
             contact: vec![0.0; n],
-            pool,
+            threads,
+            interrupt: Interrupt::default(),
         })
     }
 
@@ -219,7 +220,7 @@ impl Balance {
     pub fn place_fluid(&mut self, positions: &[Vec3], statistics: &mut Statistics) -> Result<(), LinearError> {
         let start = Instant::now();
         let done = match &mut self.fluid {
-            Some(fluid) => fluid.update(positions, self.pool.as_deref()),
+            Some(fluid) => fluid.update(positions, self.threads.pool().as_deref()),
             None => Ok(()),
         };
         statistics.seconds_fluid += start.elapsed().as_secs_f64();
@@ -236,7 +237,7 @@ impl Balance {
         self.constant.fill(0.0);
         if let Some(fluid) = self.fluid.as_mut().filter(|_| !step.scheme.fluid_is_implicit()) {
             gather(&self.fluid_dofs, |dof| step.state.velocity[dof], &mut self.flow);
-            fluid.resist(&mut self.flow, self.pool.as_deref())?;
+            fluid.resist(&mut self.flow, self.threads.pool().as_deref())?;
             scatter(&self.fluid_dofs, &self.flow, &mut self.constant);
         }
         statistics.seconds_fluid += start.elapsed().as_secs_f64();
@@ -354,12 +355,15 @@ impl Balance {
 
     fn add_fluid(&mut self, step: &Step, trial: &Unknowns) -> Option<()> {
         let Some(fluid) = self.fluid.as_mut().filter(|_| step.scheme.fluid_is_implicit()) else { return Some(()) };
-        let (increment, pool) = (step.increment(), self.pool.as_deref());
+        if self.interrupt.requested() {
+            return None;
+        }
+        let (increment, pool) = (step.increment(), self.threads.pool());
         gather(&self.fluid_dofs, |dof| increment.rate_of(dof, trial.q[dof]), &mut self.flow);
         match fluid.nonlocal() {
-            None => fluid.resist(&mut self.flow, pool).ok()?,
+            None => fluid.resist(&mut self.flow, pool.as_deref()).ok()?,
             Some(mobility) => {
-                mobility.apply(&trial.density, &mut self.slip, pool).ok()?;
+                mobility.apply(&trial.density, &mut self.slip, pool.as_deref()).ok()?;
                 let scale = mobility.scale();
                 self.slip.iter_mut().zip(&self.flow).for_each(|(slip, velocity)| *slip -= scale * velocity);
                 mobility.weigh(&trial.density, &mut self.flow);

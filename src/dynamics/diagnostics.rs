@@ -99,7 +99,7 @@ impl Simulation {
             false => None,
         };
         if let Some(fluid) = &mut stored {
-            fluid.update(&positions, self.balance.pool.as_deref())?;
+            fluid.update(&positions, self.balance.threads.pool().as_deref())?;
         } else {
             let mut ignored = super::statistics::Statistics::default();
             self.balance.place_fluid(&positions, &mut ignored)?;
@@ -135,7 +135,7 @@ impl Simulation {
         self.balance.place_fluid(&positions, &mut ignored)?;
         self.forget_fluid();
         let dofs = self.balance.fluid_dofs().to_vec();
-        let pool = self.balance.pool.clone();
+        let pool = self.balance.threads.pool();
         let Some(fluid) = self.balance.fluid_mut() else {
             return Ok(out);
         };

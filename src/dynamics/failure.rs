@@ -30,6 +30,9 @@ pub enum StepError {
         /// What went wrong.
         reason: String,
     },
+    /// The caller's hook asked to stop.
+    #[error("interrupted")]
+    Interrupted,
     /// A motor's or clamp's function of time failed.
     #[error("a function of time failed: {0}")]
     Signal(SignalError),
@@ -37,6 +40,7 @@ pub enum StepError {
 
 /// Why one try at a step failed.
 pub(super) enum TryError {
+    Interrupted,
     Signal(SignalError),
     Solve { residual: f64, iterations: usize, worst: usize, reason: String },
 }

@@ -2,7 +2,8 @@
 //!
 //! * [`specification`]: what a scene says, as plain data.
 //! * [`model`]: the constant part of a simulation, built once from a specification.
-//! * [`state`]: the changing part, plain data that can be saved and restored to the last bit.
+//! * [`state`]: the changing part, plain data that can be saved and restored to the last bit; `state_check`: of one from
+//!   elsewhere, what must hold.
 //! * [`terms`]: inertia and loads, the terms that belong to no other room.
 //! * [`adaptive`]: steps of adaptive size and order, and output between them.
 //! * [`balance`]: the force balance of one step: residual and derivative; `solve`: its linear systems.
@@ -10,6 +11,7 @@
 //! * [`control`]: the size and order of adaptive steps.
 //! * [`newton`]: Newton's method with line search on that balance.
 //! * [`failure`]: what can go wrong with a step.
+//! * [`interrupt`]: a way out of a long one.
 //! * [`predictor`]: past states: guesses, backward differences, dense output.
 //! * [`scheme`]: which terms a time-stepping scheme keeps and how it treats the fluid.
 //! * [`simulation`]: steps, retries, acceptance.
@@ -23,6 +25,7 @@ pub mod contact_model;
 pub mod control;
 pub mod diagnostics;
 pub mod failure;
+pub mod interrupt;
 pub mod model;
 pub mod newton;
 pub mod predictor;
@@ -31,6 +34,7 @@ pub mod simulation;
 mod solve;
 pub mod specification;
 pub mod state;
+mod state_check;
 pub mod statistics;
 pub mod terms;
 pub mod threads;

@@ -95,6 +95,12 @@ impl Newton<'_, '_> {
         size.ok_or_else(|| failure(None, 0, "the guess is not a configuration"))
     }
 
+    /// An error if the caller wants to stop.
+    fn go_on(&mut self, size: Size, iteration: usize) -> Result<(), NewtonFailure> {
+        let stopped = self.balance.interrupt.requested();
+        if stopped { Err(failure(Some(size), iteration, "interrupted")) } else { Ok(()) }
+    }
+
     /// Residual at the given part of the direction.
     fn try_length(&mut self, length: f64) -> Option<Size> {
         self.work.try_length(self.unknowns, length);
@@ -131,6 +137,7 @@ impl Newton<'_, '_> {
         let target = |size: &Size| (tolerance * size.scale.max(least)).max(floor);
         let mut size = self.evaluate_start()?;
         for iteration in 0..max_iterations {
+            self.go_on(size, iteration)?;
             let target = target(&size);
             if size.norm <= target {
                 return Ok(());
@@ -172,6 +179,7 @@ impl Newton<'_, '_> {
     fn reduce_correction(&mut self, tolerance: f64, max_iterations: usize) -> Result<(), NewtonFailure> {
         let mut size = self.evaluate_start()?;
         for iteration in 0..max_iterations {
+            self.go_on(size, iteration)?;
             let broken = |error: LinearError| failure(Some(size), iteration, &error.to_string());
             self.linearize().map_err(broken)?;
             let correction = self.correction().map_err(broken)?;

@@ -1,10 +1,10 @@
 //! Past states: extrapolated to the guess Newton's method starts from, differenced to rates, interpolated for output.
 
 /// Past states kept besides the present one: extrapolation of third order and the error estimate of the order above.
-const DEPTH: usize = 4;
+pub(super) const DEPTH: usize = 4;
 
 /// Highest order of the guess for Newton's method.
-const GUESS_ORDER: usize = 3;
+pub(super) const GUESS_ORDER: usize = 3;
 
 /// What is remembered of an accepted state.
 #[derive(Debug, Clone, Default, PartialEq)]

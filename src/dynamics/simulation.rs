@@ -1,12 +1,12 @@
 //! A simulation: steps a model's state, retries with smaller steps, and keeps the last good state.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use super::balance::{Balance, Step, Unknowns};
 use super::contact_model::ContactModel;
 use super::control::Control;
 use super::failure::{StepError, TryError};
+use super::interrupt::Hook;
 use super::model::{Model, ModelError};
 use super::newton::{self, Goal, NewtonSettings, NewtonWork};
 use super::predictor::{History, Sample};
@@ -14,7 +14,7 @@ use super::scheme::Scheme;
 use super::specification::Specification;
 use super::state::State;
 use super::statistics::Statistics;
-use super::threads;
+use super::threads::Threads;
 use crate::Vec3;
 use crate::contact::spillmann::ContactSolver;
 use crate::elastic::motors::Drive;
@@ -57,8 +57,7 @@ impl Simulation {
         if let Some(overlap) = model.overlap(&state) {
             return Err(ModelError::Overlap(overlap));
         }
-        let pool = threads::pool(thread_count);
-        let balance = Balance::new(&model, pool.as_ref().map(Arc::clone))?;
+        let balance = Balance::new(&model, Threads(thread_count))?;
         let contact = model.contact.as_ref().and_then(ContactModel::spillmann).map(ContactSolver::new);
         let mut state = state;
         state.density = balance.zero_density(scheme);
@@ -130,8 +129,13 @@ impl Simulation {
     /// As [`Self::restore`], for a state from elsewhere.
     ///
     /// # Errors
-    /// [`ModelError::Overlap`] if barrier contact cannot go on from there; the present state is then kept.
+    /// As [`State::check`]; [`ModelError::Shape`] if it is not a configuration; [`ModelError::Overlap`] if barrier contact
+    /// cannot go on from there. The present state is then kept.
     pub fn adopt(&mut self, state: State) -> Result<(), ModelError> {
+        state.check(&self.model, &self.state)?;
+        if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
+            return Err(ModelError::Shape { shape: "nodes" });
+        }
         if let Some(overlap) = self.model.overlap(&state).filter(|_| self.model.barrier().is_some()) {
             return Err(ModelError::Overlap(overlap));
         }
@@ -161,9 +165,6 @@ impl Simulation {
         state.contacts.clear();
         state.control = Control::default();
         state.frames.follow_turned_over(network, nodes);
-        if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
-            return Err(ModelError::Shape { shape: "nodes" });
-        }
         self.adopt(state)
     }
 
@@ -193,6 +194,7 @@ impl Simulation {
             let dt = part.min(left);
             match self.try_step(dt, 1) {
                 Ok(_) => left -= dt,
+                Err(TryError::Interrupted) => break Err(StepError::Interrupted),
                 Err(TryError::Signal(error)) => break Err(StepError::Signal(error)),
                 Err(TryError::Solve { residual, iterations, worst, reason }) => {
                     self.statistics.rejected_steps += 1;
@@ -237,10 +239,14 @@ impl Simulation {
     pub(super) fn try_step(&mut self, dt: f64, order: usize) -> Result<bool, TryError> {
         let order = order.min(self.state.history.past.len() + 1);
         let (t0, t1) = (self.state.time, self.state.time + dt);
+        self.balance.interrupt.begin();
         let mut trial = std::mem::take(&mut self.trial);
         let prepared = self.prepare(&mut trial, t0, t1);
         let solved = prepared.and_then(|motors| self.solve(motors, dt, order, &mut trial));
         self.trial = trial;
+        if self.balance.interrupt.stopped() {
+            return Err(self.interrupted());
+        }
         let angles = solved?;
         let missed = self.state.history.prediction_errors(
             (t0, &self.state.q),
@@ -258,6 +264,17 @@ impl Simulation {
             self.accept(angles, dt, order, &missed);
         }
         Ok(accepted)
+    }
+
+    /// Back to the last good state, as if the step had not been tried.
+    fn interrupted(&mut self) -> TryError {
+        self.restore(self.state.clone());
+        TryError::Interrupted
+    }
+
+    /// Sets what is asked every 50 ms of a step whether to give it up; `None` lets every step come to its end.
+    pub fn set_interrupt(&mut self, hook: Option<Hook>) {
+        self.balance.interrupt.set(hook);
     }
 
     /// Motor angles and torques at the end of the step; the guess, with the prescribed degrees of freedom set.

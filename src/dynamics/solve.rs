@@ -18,6 +18,7 @@ use std::time::Instant;
 use rayon::ThreadPool;
 
 use super::balance::{Balance, Step, Unknowns};
+use super::interrupt::Interrupt;
 use super::model::Model;
 use super::statistics::Statistics;
 use crate::fluid::FluidModel;
@@ -138,10 +139,11 @@ impl Balance {
         statistics: &mut Statistics,
     ) -> Result<(), LinearError> {
         self.work.rhs.iter_mut().zip(&self.residual).for_each(|(rhs, residual)| *rhs = -residual);
-        let Self { system, gmres, fluid, fluid_dofs, slip, work, pool, .. } = self;
+        let Self { system, gmres, fluid, fluid_dofs, slip, work, threads, interrupt, .. } = self;
         let Some(fluid) = implicit_nonlocal(fluid, step) else {
             return system.solve_refined(&work.rhs, &mut out.q);
         };
+        let pool = threads.pool();
         let Work { rhs, seek, target, image, moved, density } = work;
         // The image of b = 0 carries the force balance's own right-hand side.
         system.solve_checked(rhs, moved)?;
@@ -155,6 +157,7 @@ impl Balance {
             moved,
             density,
             pool: pool.as_deref(),
+            interrupt,
             roughly: false,
         };
         seek.fill(0.0);
@@ -165,7 +168,7 @@ impl Balance {
         target.iter_mut().zip(slip.iter()).zip(image.iter()).for_each(|((t, slip), image)| *t = -slip - image);
         match gmres.solve(&mut fluid_system, target, seek, tolerance) {
             Ok(iterations) => statistics.krylov_iterations += iterations as u64,
-            Err(error) if fluid_system.is_matrix_free() => return Err(error),
+            Err(error) if fluid_system.is_matrix_free() || error == LinearError::Interrupted => return Err(error),
             Err(_) => {
                 statistics.dense_solves += 1;
                 fluid_system.roughly = false;
@@ -209,6 +212,7 @@ struct FluidSystem<'a> {
     moved: &'a mut [f64],
     density: &'a mut [f64],
     pool: Option<&'a ThreadPool>,
+    interrupt: &'a mut Interrupt,
     /// Whether single precision will do.
     roughly: bool,
 }
@@ -245,6 +249,9 @@ impl FluidSystem<'_> {
     }
 
     fn product(&mut self, image: &mut [f64]) -> Result<(), LinearError> {
+        if self.interrupt.requested() {
+            return Err(LinearError::Interrupted);
+        }
         let Some(mobility) = self.fluid.nonlocal() else { return Ok(()) };
         if self.roughly {
             mobility.apply_roughly(self.density, image, self.pool)?;

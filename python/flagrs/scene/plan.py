@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flagrs.memory import in_words
 from flagrs.scene.values import FloatArray
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ PAIR_FLOPS = 200
 HINGE_FLOPS = 6000
 #: Operations of the fluid's products in a step per node, without a matrix: some thirty of about 10 us.
 FAST_FLOPS = 2.4e6
+#: Memory of a node's share of matrices, factors and histories, measured; vectors that GMRES keeps.
+NODE_BYTES = 20_000
+KRYLOV_VECTORS = 241
 #: Newton iterations of a typical step, and products with the fluid matrix in each.
 NEWTON_ITERATIONS = 2
 PRODUCTS = 8
@@ -67,6 +71,20 @@ class Plan:
         """Memory of the dense fluid matrix [bytes]."""
         return 8 * self.fluid_matrix**2
 
+    @property
+    def memory(self) -> float:
+        """Memory of a simulation [bytes], to a factor of two.
+
+        The dense fluid matrix in double and single precision, the vectors of the Krylov method, and some
+        `NODE_BYTES` a node for everything sparse.
+        """
+        vectors = (
+            8.0
+            * KRYLOV_VECTORS
+            * (3 * self.immersed_nodes if self.fluid_matrix or self.far_field_error else 0)
+        )
+        return 1.5 * self.fluid_bytes + vectors + NODE_BYTES * self.nodes
+
     def __str__(self) -> str:
         """Return the plan for a person to read."""
         lines = [
@@ -76,12 +94,13 @@ class Plan:
         ]
         if self.fluid_matrix:
             lines.append(
-                f"fluid:    dense {self.fluid_matrix} x {self.fluid_matrix}, {_size(self.fluid_bytes)}"
+                f"fluid:    dense {self.fluid_matrix} x {self.fluid_matrix}, {in_words(self.fluid_bytes)}"
             )
         elif self.far_field_error is not None:
             lines.append(
                 f"fluid:    products to {self.far_field_error:g} by fast multipoles, without a matrix"
             )
+        lines.append(f"memory:   about {in_words(self.memory)}")
         lines.append(f"a step:   about {self.flops / 1e6:.3g} million floating-point operations")
         return "\n".join([*lines, *(f"warning:  {warning}" for warning in self.warnings)])
 
@@ -178,11 +197,3 @@ def _conditioning(rod: int, ratio: FloatArray) -> list[str]:
         f"{condition:.0e}) and the force density oscillates; use edges of at least {CURED_EDGE:g} epsilon, "
         "or a smaller epsilon"
     ]
-
-
-def _size(count: float) -> str:
-    for unit in ("bytes", "kB", "MB"):
-        if count < 1000:
-            return f"{count:.3g} {unit}"
-        count /= 1000
-    return f"{count:.3g} GB"

@@ -290,7 +290,5 @@ def _count(contour: float, edge_length: float | None, edge_count: int | None) ->
             allowed="exactly one of edge_length [m] and edge_count",
         )
     return (
-        shapes.whole("edge_count", edge_count)
-        if edge_length is None
-        else shapes.edge_count(contour, edge_length)
+        shapes.checked_count(edge_count) if edge_length is None else shapes.edge_count(contour, edge_length)
     )
