@@ -26,7 +26,6 @@ from flagrs.time_step import (
     STABLE_SHARE,
     default_step,
     explicit_limit,
-    size,
 )
 from flagrs.trajectory import Trajectory
 
@@ -103,7 +102,7 @@ class Simulation:
         self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
         self._restored: Path | None = None
         if rtol is not None:
-            self._native.set_tolerance(LOCAL_SHARE * rtol * size(scene))
+            self._native.set_tolerance(LOCAL_SHARE * rtol)
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
 
