@@ -180,7 +180,11 @@ def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
     """
     rows = []
     for rod in scene.rods:
-        contour = float(rod.rest_lengths()[rod.immersed_array()].sum())
+        immersed = rod.immersed_array()
+        if not immersed.any():
+            rows.append(np.zeros((len(immersed), 2)))  # no drag, and no length to take it from
+            continue
+        contour = float(rod.rest_lengths()[immersed].sum())
         wavelength = contour if fluid.wavelength is None else fluid.wavelength
         radius = rod.radius_array()
         if fluid.coefficients == "gray-hancock":
@@ -192,7 +196,8 @@ def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
         across = 4.0 * np.pi * fluid.viscosity / (logarithm + 0.5)
         rows.append(np.stack([along, across], axis=1))
     coefficients: FloatArray = np.concatenate(rows)
-    if not (coefficients > 0.0).all():
+    wet = np.concatenate([rod.immersed_array() for rod in scene.rods])
+    if not (coefficients[wet] > 0.0).all():
         raise SceneError(
             "fluid.wavelength: too short for the radius; resistive force theory needs slender filaments",
             field="fluid.wavelength",

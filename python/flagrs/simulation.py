@@ -14,6 +14,7 @@ import scipy.sparse
 
 from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
+from flagrs.default_step import default_step
 from flagrs.errors import SceneError, not_allowed
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
@@ -24,7 +25,6 @@ from flagrs.threads import thread_count
 from flagrs.time_step import (
     LOCAL_SHARE,
     STABLE_SHARE,
-    default_step,
     explicit_limit,
 )
 from flagrs.trajectory import Trajectory
@@ -54,12 +54,12 @@ class Simulation:
         the same with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
-        Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit
-        for the explicit scheme.
+        Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest motor
+        or less where filaments relax faster; a fifth of the stability limit for the explicit scheme.
     rtol
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
-        of node positions, relative to the size of the filaments (`flagrs.time_step.size`). None: steps of
-        `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
+        of node positions, relative to the size of the filament they are on (docs/theory/time.md). None:
+        steps of `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all. Results do not depend on it.
 
