@@ -74,8 +74,8 @@ def _natural_twist(rod: Rod) -> FloatArray:
 
 
 def _directors(scene: Scene) -> list[tuple[int, list[float]]]:
-    given = [(scene.edge_offset(k), rod.director) for k, rod in enumerate(scene.rods)]
-    return [(edge, director.tolist()) for edge, director in given if director is not None]
+    given = [(k, rod.director) for k, rod in enumerate(scene.rods) if rod.director is not None]
+    return [(scene.edge_offset(k), director.tolist()) for k, director in given]
 
 
 def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[[float], float]:
@@ -87,7 +87,7 @@ def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[
 def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
     rod = scene.rods[motor.rod]
     hinge, second = hinge_of_motor(rod, motor)
-    offset = sum(len(other.hinge_array()) for other in scene.rods[: motor.rod])
+    offset = scene.hinge_offset(motor.rod)
     return {
         "hinge": offset + hinge,
         "shaft_second": second,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
@@ -51,7 +53,7 @@ def default_step(scene: Scene) -> float:
 
 
 def _turning_step(signal: object) -> float:
-    """Return the step in which a motor or clamp turns by little, as its signal says [s]; infinite if it is still."""
+    """Return the step in which a motor or clamp turns by little [s]; infinite if it is still."""
     if isinstance(signal, Table):
         rate = float(np.abs(signal.values).max())
         return TURN_PER_STEP / rate if rate > 0.0 else np.inf
@@ -87,9 +89,11 @@ def _unbalanced(network: Network, relaxations: list[Relaxation]) -> list[float]:
         label = network.labels[dofs[0]]
         amplitude = max(amplitude, float(moved[label]) * found.time / found.size)
         if amplitude <= NOTICED and network.stressed:
-            # Stress without a force, as in a twisted ring, may be unstable: as much of the slowest mode as it has energy for.
+            # Stress without a force, as in a twisted ring, may be unstable: it may move as far as its energy
+            # takes the slowest mode.
             own = resistance.diagonal()[at_nodes].sum() / 3.0
-            amplitude = max(amplitude, np.sqrt(2.0 * network.energy(label) / (square * own)) / found.size)
+            reach = math.sqrt(2.0 * network.energy(label) / (square * own))
+            amplitude = max(amplitude, reach / found.size)
         if not np.isfinite(amplitude) or amplitude > NOTICED:
             steps.append(RELAXATION_SHARE * found.time)
         elif amplitude > 0.0:

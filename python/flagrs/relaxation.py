@@ -14,8 +14,8 @@ import scipy.sparse.linalg
 from scipy.sparse.csgraph import connected_components
 
 from flagrs import _flagrs
-from flagrs.assemble import native_scene, resistive_coefficients
-from flagrs.scene import Fluid, Scene
+from flagrs.assemble import native_scene
+from flagrs.scene import Fluid, Rod, Scene
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
 
 #: Degrees of freedom up to which a filament's eigenvalues are found densely.
@@ -71,7 +71,8 @@ class Network:
         self._native = native_scene(_bare(scene))
         fluid = self._native["fluid"]
         self.wet = scene.fluid is not None and scene.fluid.model != "none"
-        self._coefficients = drag_coefficients(scene)
+        given = None if fluid is None else fluid["coefficients"]
+        self._coefficients = slender_coefficients(scene) if given is None else given
         if fluid is not None:
             self._native["fluid"] = {**fluid, "epsilon": None, "coefficients": self._coefficients}
         nodes = self._native["rest_nodes"]
@@ -112,7 +113,7 @@ class Network:
 
     @cached_property
     def resistance(self) -> scipy.sparse.csr_array:
-        """Resistance of every degree of freedom by itself [N s/m, N m s]; its mass in filaments that are dry."""
+        """Resistance of every degree of freedom by itself [N s/m, N m s]; mass in filaments that are dry."""
         fluid = self._native["fluid"]
         immersed = np.zeros(len(self.edges), bool) if fluid is None else np.array(fluid["immersed"])
         along, across = (self._coefficients * np.where(immersed, 1.0, DRY_SHARE)[:, None]).T
@@ -155,7 +156,7 @@ class Network:
 
     def gradient(self) -> FloatArray:
         """Return the elastic gradient (ndof,) of the initial shape [N, N m]."""
-        return _flagrs.Simulation(self._native, "implicit", 1.0, 1).gradient()
+        return self._start.gradient()
 
     def energy(self, label: int) -> float:
         """Return the elastic energy of one filament in its initial shape [J]."""
@@ -175,9 +176,12 @@ class Network:
     @cached_property
     def stressed(self) -> bool:
         """Whether anything is strained at the start, beyond round-off."""
-        native = _flagrs.Simulation(self._native, "implicit", 1.0, 1)
         stretched = 0.5 * float((self._native["stretching"] * self.lengths).sum())
-        return float(sum(native.energies())) > 1e-20 * stretched
+        return float(sum(self._start.energies())) > 1e-20 * stretched
+
+    @cached_property
+    def _start(self) -> _flagrs.Simulation:
+        return _flagrs.Simulation(self._native, "implicit", 1.0, 1)
 
     def loads(self) -> FloatArray:
         """Return point loads, weight less buoyancy and motor torques at the start (ndof,) [N, N m]."""
@@ -228,7 +232,8 @@ class Network:
             np.minimum.at(soft, around.ravel(), np.repeat(weakest, 4))
         with np.errstate(divide="ignore", invalid="ignore"):
             bend, twist = soft / (pull * length**3), soft / (turn * length)
-            return ELASTIC_SHARE * np.fmin(bend, twist)[:filaments]
+            least: FloatArray = ELASTIC_SHARE * np.fmin(bend, twist)[:filaments]
+        return least
 
     def _chosen(self) -> IntArray:
         bend = np.flatnonzero(np.isfinite(self._least) & (self._least > 0.0))
@@ -259,7 +264,7 @@ class Network:
 
 
 def _slowest(stiffness: Any, resistance: Any, least: float) -> float | None:
-    """Return the smallest eigenvalue of K v = rate R v that belongs to a mode with energy; None if there is none."""
+    """Return the smallest eigenvalue of K v = rate R v of a mode with energy; None if there is none."""
     count = stiffness.shape[0]
     drag = resistance.diagonal()
     fastest = float((abs(stiffness).sum(axis=1) / drag).max())
@@ -292,21 +297,19 @@ def _bare(scene: Scene) -> Scene:
     return scene if scene.contact is None else scene.replace(contact=None)
 
 
-def drag_coefficients(scene: Scene) -> FloatArray:
-    """Return drag per length along and across every edge (E, 2) [N s/m^2].
+def slender_coefficients(scene: Scene) -> FloatArray:
+    """Return drag per length along and across every edge (E, 2) [N s/m^2] that stands for nonlocal drag.
 
-    Those of resistive force theory where that is the fluid's model; with nonlocal drag the slender body's
-    4 pi mu / (ln(2 L / a) + 1/2) across and half of it along, L being the immersed length of the rod.
+    That of a slender body, 4 pi mu / (ln(2 L / a) + 1/2) across and half of it along, L being the immersed
+    length of the rod.
     """
     fluid = scene.fluid
     if fluid is None or fluid.model == "none":
         return np.zeros((scene.edge_count, 2))
-    if fluid.model == "RFT":
-        return resistive_coefficients(scene, fluid)
     return np.concatenate([_slender(fluid, rod) for rod in scene.rods])
 
 
-def _slender(fluid: Fluid, rod: Any) -> FloatArray:
+def _slender(fluid: Fluid, rod: Rod) -> FloatArray:
     lengths, immersed = rod.rest_lengths(), rod.immersed_array()
     contour = float(lengths[immersed].sum()) or float(lengths.sum())
     logarithm = np.maximum(np.log(2.0 * contour / rod.radius_array()), 0.5) + 0.5

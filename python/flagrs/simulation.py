@@ -54,12 +54,13 @@ class Simulation:
         the same with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
-        Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest motor
-        or less where filaments relax faster; a fifth of the stability limit for the explicit scheme.
+        Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
+        motor or less where filaments relax faster; a fifth of the stability limit for the explicit scheme.
     rtol
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
         of node positions, relative to the size of the filament they are on (docs/theory/time.md). None:
-        steps of `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
+        steps of `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first
+        step.
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all. Results do not depend on it.
 

@@ -53,7 +53,8 @@ def fastest_rate(scene: Scene) -> float:
 def samples() -> tuple[FloatArray, float]:
     """Return the times at which functions of time are looked at [s], and how much later once more [s].
 
-    They are spread evenly over ten seconds, and over the decades below, at distances no period is a multiple of.
+    They are spread evenly over ten seconds, and over the decades below, at distances that are no multiples of
+    a period.
     """
     even = 10.0 * ((np.arange(1, 201) * GOLDEN) % 1.0)
     decades = 10.0 ** (1.0 - 7.0 * ((np.arange(1, 101) * GOLDEN) % 1.0))
