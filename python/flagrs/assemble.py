@@ -74,8 +74,8 @@ def _natural_twist(rod: Rod) -> FloatArray:
 
 
 def _directors(scene: Scene) -> list[tuple[int, list[float]]]:
-    given = [(scene.edge_offset(k), rod.director) for k, rod in enumerate(scene.rods)]
-    return [(edge, director.tolist()) for edge, director in given if director is not None]
+    given = [(k, rod.director) for k, rod in enumerate(scene.rods) if rod.director is not None]
+    return [(scene.edge_offset(k), director.tolist()) for k, director in given]
 
 
 def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[[float], float]:
@@ -87,7 +87,7 @@ def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[
 def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
     rod = scene.rods[motor.rod]
     hinge, second = hinge_of_motor(rod, motor)
-    offset = sum(len(other.hinge_array()) for other in scene.rods[: motor.rod])
+    offset = scene.hinge_offset(motor.rod)
     return {
         "hinge": offset + hinge,
         "shaft_second": second,
@@ -180,7 +180,11 @@ def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
     """
     rows = []
     for rod in scene.rods:
-        contour = float(rod.rest_lengths()[rod.immersed_array()].sum())
+        immersed = rod.immersed_array()
+        if not immersed.any():
+            rows.append(np.zeros((len(immersed), 2)))  # no drag, and no length to take it from
+            continue
+        contour = float(rod.rest_lengths()[immersed].sum())
         wavelength = contour if fluid.wavelength is None else fluid.wavelength
         radius = rod.radius_array()
         if fluid.coefficients == "gray-hancock":
@@ -192,7 +196,8 @@ def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
         across = 4.0 * np.pi * fluid.viscosity / (logarithm + 0.5)
         rows.append(np.stack([along, across], axis=1))
     coefficients: FloatArray = np.concatenate(rows)
-    if not (coefficients > 0.0).all():
+    wet = np.concatenate([rod.immersed_array() for rod in scene.rods])
+    if not (coefficients[wet] > 0.0).all():
         raise SceneError(
             "fluid.wavelength: too short for the radius; resistive force theory needs slender filaments",
             field="fluid.wavelength",

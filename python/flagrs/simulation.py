@@ -14,6 +14,7 @@ import scipy.sparse
 
 from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
+from flagrs.default_step import default_step
 from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
@@ -29,9 +30,7 @@ from flagrs.threads import thread_count
 from flagrs.time_step import (
     LOCAL_SHARE,
     STABLE_SHARE,
-    default_step,
     explicit_limit,
-    size,
 )
 from flagrs.trajectory import Trajectory
 
@@ -60,12 +59,13 @@ class Simulation:
         the same with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
-        Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit
-        for the explicit scheme.
+        Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
+        motor or less where filaments relax faster; a fifth of the stability limit for the explicit scheme.
     rtol
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
-        of node positions, relative to the size of the filaments (`flagrs.time_step.size`). None: steps of
-        `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
+        of node positions, relative to the size of the filament they are on (docs/theory/time.md). None:
+        steps of `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first
+        step.
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all. Results do not depend on it.
 
@@ -115,7 +115,7 @@ class Simulation:
         self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
         self._restored: Path | None = None
         if rtol is not None:
-            self._native.set_tolerance(LOCAL_SHARE * rtol * size(scene))
+            self._native.set_tolerance(LOCAL_SHARE * rtol)
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
 

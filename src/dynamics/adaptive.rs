@@ -20,13 +20,13 @@ const FAILED_FACTOR: f64 = 0.4;
 const NEWTON_SHARE: f64 = 0.1;
 
 impl Simulation {
-    /// Makes the local error of every step at most `tolerance` metres by choosing its size and order; `None` goes back to
-    /// steps of `dt`, first order.
+    /// Makes the local error of every step at most `tolerance` of the size of each filament by choosing its size and order; `None`
+    /// goes back to steps of `dt`, first order.
     pub fn set_tolerance(&mut self, tolerance: Option<f64>) {
         self.tolerance = tolerance;
         self.settings = NewtonSettings::default();
-        if let Some(length) = tolerance {
-            self.settings.goal = Goal::Displacement(NEWTON_SHARE * length);
+        if let Some(error) = tolerance {
+            self.settings.goal = Goal::Displacement(NEWTON_SHARE * error);
         }
     }
 

@@ -9,6 +9,8 @@
 //! * [`balance`]: the force balance of one step: residual and derivative; `solve`: its linear systems.
 //! * [`contact_model`]: how rods are kept apart; `barrier_term`: the barrier in a step's equations.
 //! * [`control`]: the size and order of adaptive steps.
+//! * [`filaments`]: the parts of a scene that move on their own, and their sizes; `targets`, `round_off`: what a residual is
+//!   measured by on each.
 //! * [`newton`]: Newton's method with line search on that balance.
 //! * [`failure`]: what can go wrong with a step.
 //! * [`interrupt`]: a way out of a long one.
@@ -25,10 +27,12 @@ pub mod contact_model;
 pub mod control;
 pub mod diagnostics;
 pub mod failure;
+pub mod filaments;
 pub mod interrupt;
 pub mod model;
 pub mod newton;
 pub mod predictor;
+mod round_off;
 pub mod scheme;
 pub mod simulation;
 mod solve;
@@ -36,5 +40,6 @@ pub mod specification;
 pub mod state;
 mod state_check;
 pub mod statistics;
+mod targets;
 pub mod terms;
 pub mod threads;

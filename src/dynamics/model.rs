@@ -2,7 +2,9 @@
 
 use super::contact_model::{ContactModel, Overlap};
 use super::control::Control;
+use super::filaments::Filaments;
 use super::predictor::History;
+use super::round_off::RoundOff;
 use super::specification::{FluidModelSpecification, Specification};
 use super::state::State;
 use super::terms::{Inertia, Loads};
@@ -88,12 +90,13 @@ pub struct Model {
     pub(super) clamps: Vec<Clamp>,
     pub(super) prescribed: Vec<bool>,
     pub(super) pattern: Pattern,
+    pub(super) filaments: Filaments,
     /// Turns residuals into forces: 1 for positions, one over a length for angles.
     pub(super) force_weight: Vec<f64>,
+    /// Turns errors of degrees of freedom into those relative to the size of a filament; 0 for what is prescribed.
+    pub(super) error_weight: Vec<f64>,
+    pub(super) round_off: RoundOff,
     pub(super) mass: Vec<f64>,
-    pub(super) stretching_scale: f64,
-    pub(super) bending_scale: f64,
-    pub(super) shortest_edge: f64,
     pub(super) contact: Option<ContactModel>,
     pub(super) specification: Specification,
 }
@@ -130,12 +133,11 @@ impl Model {
         inertia.bind(&pattern);
         dissipative.iter_mut().for_each(|term| term.bind(&pattern));
 
-        let mean_length = rest.lengths.iter().sum::<f64>() / rest.lengths.len() as f64;
-        let total_length = rest.lengths.iter().sum::<f64>();
-        let mut force_weight = vec![1.0 / mean_length; dof_count];
-        network.node_dofs().iter().for_each(|&dof| force_weight[dof..dof + 3].fill(1.0));
         let (clamps, prescribed) = clamps(&specification, &network, dof_count);
-        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let filaments = Filaments::new(&specification, &network, &stencils, &prescribed, &rest.lengths);
+        let force_weight = filaments.force_weights(&network);
+        let spin = spin_resistances(&specification, &rest.lengths);
+        let round_off = RoundOff::new(&specification, &network, dof_count, (&rest.lengths, &rest.voronoi), &spin);
         let contact = specification
             .contact
             .as_ref()
@@ -151,12 +153,11 @@ impl Model {
             clamps,
             prescribed,
             pattern,
-            force_weight,
             mass,
-            stretching_scale: largest(&mut specification.stretching.iter().copied()),
-            bending_scale: largest(&mut specification.bending.iter().map(|ei| ei[0][0].max(ei[1][1])))
-                / (total_length * total_length),
-            shortest_edge: rest.lengths.iter().copied().fold(f64::INFINITY, f64::min),
+            error_weight: filaments.error_weights(&force_weight),
+            filaments,
+            round_off,
+            force_weight,
             contact,
             network,
             specification,
@@ -182,6 +183,11 @@ impl Model {
     /// Topology and numbering.
     pub fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// The parts that move on their own.
+    pub fn filaments(&self) -> &Filaments {
+        &self.filaments
     }
 
     /// Number of bodies that contact knows: edges, and with barrier contact spheres.
@@ -423,6 +429,15 @@ fn masses(specification: &Specification, network: &Network, dof_count: usize, le
     mass
 }
 
+/// Resistance of every edge to spinning about its centreline, N m s.
+fn spin_resistances(specification: &Specification, lengths: &[f64]) -> Vec<f64> {
+    let Some(fluid) = specification.fluid.as_ref().filter(|fluid| fluid.twist_drag) else {
+        return vec![0.0; lengths.len()];
+    };
+    let resistance = |edge: usize| 4.0 * PI * fluid.viscosity * specification.radius[edge].powi(2) * lengths[edge];
+    (0..lengths.len()).map(|edge| if fluid.immersed[edge] { resistance(edge) } else { 0.0 }).collect()
+}
+
 fn dissipative_terms(
     specification: &Specification,
     network: &Network,
@@ -432,10 +447,8 @@ fn dissipative_terms(
     let mut terms: Vec<Box<dyn Term>> = Vec::new();
     if let Some(fluid) = specification.fluid.as_ref().filter(|fluid| fluid.twist_drag) {
         let edges: Vec<usize> = (0..network.edges().len()).filter(|&edge| fluid.immersed[edge]).collect();
-        let coefficients = edges
-            .iter()
-            .map(|&edge| 4.0 * PI * fluid.viscosity * specification.radius[edge].powi(2) * lengths[edge])
-            .collect();
+        let spin = spin_resistances(specification, lengths);
+        let coefficients = edges.iter().map(|&edge| spin[edge]).collect();
         if !edges.is_empty() {
             terms.push(Box::new(TwistDrag::new(network, edges, coefficients)));
         }

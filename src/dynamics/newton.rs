@@ -1,17 +1,18 @@
 //! Newton's method with line search on the force balance of a step.
 
-use super::balance::{Balance, Size, Step, Unknowns};
+use super::balance::{Balance, Step, Unknowns};
 use super::model::Model;
 use super::statistics::Statistics;
+use super::targets::Size;
 use crate::linear::LinearError;
 
 /// Where Newton's method stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Goal {
-    /// Largest residual force, relative to the largest force in the balance: forces and torques then balance that well.
+    /// Largest residual force, relative to the largest force on the same filament: forces and torques then balance that well.
     Residual(f64),
-    /// Largest displacement, m, by which the solution is still to be corrected. Tensions may then be off by the axial stiffness
-    /// times a strain that no one can see, as long as the nodes are where they should be.
+    /// Largest displacement, relative to the size of its filament, by which the solution is still to be corrected. Tensions may
+    /// then be off by the axial stiffness times a strain that no one can see, as long as the nodes are where they should be.
     Displacement(f64),
 }
 
@@ -63,9 +64,10 @@ pub(super) fn solve(
     unknowns: &mut Unknowns,
     statistics: &mut Statistics,
 ) -> Result<(), NewtonFailure> {
+    balance.aim(model, step, settings.goal, &unknowns.q);
     let mut newton = Newton { balance, model, step, work, unknowns, statistics };
     match settings.goal {
-        Goal::Residual(tolerance) => newton.reduce_residual(tolerance, settings.max_iterations),
+        Goal::Residual(_) => newton.reduce_residual(settings.max_iterations),
         Goal::Displacement(tolerance) => newton.reduce_correction(tolerance, settings.max_iterations),
     }
 }
@@ -131,30 +133,27 @@ impl Newton<'_, '_> {
         self.balance.correction(self.model, self.step, self.statistics)
     }
 
-    fn reduce_residual(&mut self, tolerance: f64, max_iterations: usize) -> Result<(), NewtonFailure> {
-        let floor = round_off(self.balance, self.model, self.step, &self.unknowns.q);
-        let least = 1e-8 * self.model.bending_scale;
-        let target = |size: &Size| (tolerance * size.scale.max(least)).max(floor);
+    fn reduce_residual(&mut self, max_iterations: usize) -> Result<(), NewtonFailure> {
         let mut size = self.evaluate_start()?;
         for iteration in 0..max_iterations {
             self.go_on(size, iteration)?;
-            let target = target(&size);
-            if size.norm <= target {
+            if size.excess <= 1.0 {
                 return Ok(());
             }
-            let linear = (LINEAR_SHARE * target / size.norm).clamp(LINEAR_TOLERANCE, LOOSEST);
+            let merit = self.balance.weigh(self.model);
+            let linear = (LINEAR_SHARE / size.excess).clamp(LINEAR_TOLERANCE, LOOSEST);
             self.linearize()
                 .and_then(|()| self.find_direction(linear))
                 .map_err(|error| failure(Some(size), iteration, &error.to_string()))?;
             let mut length = self.full_length();
             let lower = (0..BACKTRACKS).find_map(|_| {
-                let sufficient = (1.0 - 1e-4 * length) * size.merit;
+                let sufficient = (1.0 - 1e-4 * length) * merit;
                 let trial = self.try_length(length).filter(|trial| trial.merit < sufficient);
                 length *= 0.5;
                 trial
             });
             let Some(lower) = lower else {
-                if size.norm <= STAGNATION * target {
+                if size.excess <= STAGNATION {
                     // The configuration is left at the last trial: bring it back to the accepted point.
                     let _ = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
                     return Ok(());
@@ -168,7 +167,7 @@ impl Newton<'_, '_> {
             self.accept();
             size = lower;
         }
-        if size.norm <= STAGNATION * target(&size) {
+        if size.excess <= STAGNATION {
             return Ok(());
         }
         Err(failure(Some(size), max_iterations, "too many iterations"))
@@ -178,6 +177,7 @@ impl Newton<'_, '_> {
     /// and of soft directions then count alike (the natural level function of Deuflhard, Newton Methods, 2004, section 3.3).
     fn reduce_correction(&mut self, tolerance: f64, max_iterations: usize) -> Result<(), NewtonFailure> {
         let mut size = self.evaluate_start()?;
+        self.balance.weigh(self.model);
         for iteration in 0..max_iterations {
             self.go_on(size, iteration)?;
             let broken = |error: LinearError| failure(Some(size), iteration, &error.to_string());
@@ -237,17 +237,4 @@ impl NewtonWork {
         move_along(&mut self.trial.density, &from.density, &self.direction.density);
         move_along(&mut self.trial.tensions, &from.tensions, &self.direction.tensions);
     }
-}
-
-/// Round-off of a nodal force: positions are exact to `u |x|`, strains to `u |x| / l`, tensions to EA times that; inertia
-/// and drag multiply differences of positions by masses and resistances over powers of the step.
-fn round_off(balance: &Balance, model: &Model, step: &Step, q: &[f64]) -> f64 {
-    let farthest = model
-        .network
-        .node_dofs()
-        .iter()
-        .flat_map(|&dof| q[dof..dof + 3].iter())
-        .fold(0.0, |far: f64, x| far.max(x.abs()));
-    let tension = model.stretching_scale * (1.0 + farthest / model.shortest_edge);
-    2.0 * f64::EPSILON * (tension + balance.largest_stiffness(model, step) * farthest)
 }

@@ -251,7 +251,7 @@ impl Simulation {
         let missed = self.state.history.prediction_errors(
             (t0, &self.state.q),
             (t1, &self.trial.q),
-            &self.model.force_weight,
+            &self.model.error_weight,
             &mut self.extrapolated,
         );
         let mut accepted = true;

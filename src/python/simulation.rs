@@ -56,7 +56,7 @@ impl Simulation {
         interruptible(py, &mut self.inner, |inner| (0..count).try_for_each(|_| inner.step()))
     }
 
-    /// Local error (m) that adaptive steps keep to; fixed steps without.
+    /// Local error, relative to the size of each filament, that adaptive steps keep to; fixed steps without.
     #[pyo3(signature = (tolerance=None))]
     fn set_tolerance(&mut self, tolerance: Option<f64>) {
         self.inner.set_tolerance(tolerance);
