@@ -10,7 +10,7 @@ import numpy as np
 
 from flagrs.contact_scales import barrier_stiffness, slip_velocity
 from flagrs.errors import SceneError, not_allowed
-from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology
+from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology, scene_checks
 from flagrs.scene.signal import Signal
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
 
@@ -122,25 +122,14 @@ def hinge_of_motor(rod: Rod, motor: Motor) -> tuple[int, bool]:
 
 def _head(scene: Scene, head: Head) -> dict[str, Any]:
     viscosity = 0.0 if scene.fluid is None else scene.fluid.viscosity
-    before, after = head_neighbours(scene.rods[head.rod], head)
-    offset = scene.node_offset(head.rod)
+    offset = scene.edge_offset(head.rod)
     return {
-        "node": offset + head.node,
-        "neighbours": [offset + before, offset + after],
+        "node": scene.node_offset(head.rod) + head.node,
+        "edges": [offset + edge for edge in scene_checks.edges_of_head(scene, head)],
         "translation": head.C_t * 6.0 * math.pi * viscosity * head.radius,
         "rotation": head.C_r * 8.0 * math.pi * viscosity * head.radius**3,
         "mass": head.mass,
     }
-
-
-def head_neighbours(rod: Rod, head: Head) -> tuple[int, int]:
-    """Return the two nodes next to the head's node, in the order of the rod's edges."""
-    neighbours = [
-        rod_topology.far_end(rod.edge_array(), edge, head.node)
-        for edge, pair in enumerate(rod.edge_array().tolist())
-        if head.node in pair
-    ]
-    return neighbours[0], neighbours[1]
 
 
 def _clamp(scene: Scene, clamp: Clamp) -> dict[str, Any]:

@@ -14,7 +14,7 @@ use crate::elastic::motors::{Drive, Motor};
 use crate::elastic::stretching::Stretching;
 use crate::elastic::twisting::Twisting;
 use crate::fluid::FluidModel;
-use crate::fluid::head::Head;
+use crate::fluid::head::{Head, MOST_EDGES};
 use crate::fluid::product::FarFieldChoice;
 use crate::fluid::rft::ResistiveForce;
 use crate::fluid::rss::StokesletSegments;
@@ -280,6 +280,12 @@ fn check(specification: &Specification) -> Result<(), ModelError> {
     positive("radius", &specification.radius)?;
     positive("stretching", &specification.stretching)?;
     positive("twisting", &specification.twisting)?;
+    if let Some(head) = &specification.head
+        && !(1..=MOST_EDGES).contains(&head.edges.len())
+    {
+        let (field, value) = ("head.edges".to_owned(), head.edges.len() as f64);
+        return Err(ModelError::Value { field, value, allowed: "1 to 6 edges fixed to the head" });
+    }
     for (k, ei) in specification.bending.iter().enumerate() {
         let determinant = ei[0][0] * ei[1][1] - ei[0][1] * ei[1][0];
         if !(ei[0][0] > 0.0 && determinant > 0.0 && ei[0][1] == ei[1][0]) {
@@ -440,7 +446,8 @@ fn dissipative_terms(
         }
     }
     if let Some(head) = &specification.head {
-        terms.push(Box::new(Head::new(network, head.node, head.neighbours, head.translation, head.rotation)));
+        let drag = [head.translation, head.rotation];
+        terms.push(Box::new(Head::new(network, head.node, head.edges.clone(), lengths, drag)));
     }
     let forces = loads(specification, network, dof_count, lengths);
     if forces.iter().any(|&force| force != 0.0) {

@@ -48,7 +48,7 @@ struct MotorInput<'py> {
 #[pyo3(from_item_all)]
 struct HeadInput {
     node: usize,
-    neighbours: [usize; 2],
+    edges: Vec<usize>,
     translation: f64,
     rotation: f64,
     mass: f64,
@@ -147,7 +147,7 @@ impl SceneInput<'_> {
                 .collect(),
             head: self.head.map(|head| HeadSpecification {
                 node: head.node,
-                neighbours: head.neighbours,
+                edges: head.edges,
                 translation: head.translation,
                 rotation: head.rotation,
                 mass: head.mass,
