@@ -2,6 +2,7 @@
 
 from flagrs import contact, fluid, scenarios
 from flagrs.errors import ConvergenceError, FlagrsError, SceneError
+from flagrs.guards import EnergyWarning, FlagrsWarning, MeshWarning, ReynoldsWarning, StrainWarning
 from flagrs.scene import (
     Clamp,
     Contact,
@@ -23,16 +24,21 @@ __all__ = [
     "Clamp",
     "Contact",
     "ConvergenceError",
+    "EnergyWarning",
     "FlagrsError",
+    "FlagrsWarning",
     "Fluid",
     "Head",
     "Material",
+    "MeshWarning",
     "Motor",
     "PointLoad",
+    "ReynoldsWarning",
     "Rod",
     "Scene",
     "SceneError",
     "Simulation",
+    "StrainWarning",
     "Suggestion",
     "Table",
     "Trajectory",

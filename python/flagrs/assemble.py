@@ -13,6 +13,7 @@ from flagrs.errors import SceneError, not_allowed
 from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology, scene_checks
 from flagrs.scene.signal import Signal
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
+from flagrs.time_step import rod_size
 
 #: Excluded rest arc length over the sum of radii where a contact gives none; see docs/theory/contact.md.
 EXCLUSION_FACTOR = math.pi / 2.0
@@ -53,9 +54,28 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "clamps": [_clamp(scene, clamp) for clamp in scene.clamps],
         "loads": [(scene.node_offset(load.rod) + load.node, load.force.tolist()) for load in scene.loads],
         "gravity": scene.gravity.tolist(),
+        "reynolds": reynolds_per_speed(scene),
         "fluid": None if scene.fluid is None else _fluid(scene, scene.fluid),
         "contact": None if scene.contact is None else _contact(scene, scene.contact),
     }
+
+
+def reynolds_per_speed(scene: Scene) -> FloatArray:
+    """Return each node's Reynolds number over its speed (N,) [s/m], 0 for dry ones.
+
+    It is density times size over viscosity, with the size of the node's rod across its axis, the radius of a
+    helix (`flagrs.time_step.size`), or the radius of the head on the head's node.
+    """
+    fluid = scene.fluid
+    sizes = np.zeros(scene.node_count)
+    if fluid is None:
+        return sizes
+    for number, rod in enumerate(scene.rods):
+        wet = np.unique(rod.edge_array()[rod.immersed_array()])
+        sizes[scene.node_offset(number) + wet] = rod_size(rod)
+    if scene.head is not None:
+        sizes[scene.node_offset(scene.head.rod) + scene.head.node] = scene.head.radius
+    return sizes * (fluid.density_for_inertia / fluid.viscosity)
 
 
 def _theta(rod: Rod) -> FloatArray:
@@ -150,7 +170,7 @@ def _fluid(scene: Scene, fluid: Fluid) -> dict[str, Any]:
         "viscosity": fluid.viscosity,
         "immersed": (immersed & (fluid.model != "none")).tolist(),
         "twist_drag": fluid.twist_drag,
-        "density": fluid.density,
+        "density": fluid.density_for_buoyancy,
         "far_field_error": fluid.far_field_error,
         "far_field_nodes": fluid.crossover,
         "epsilon": None if local else fluid.epsilon_array(radius),

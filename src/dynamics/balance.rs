@@ -130,8 +130,13 @@ pub(super) struct Balance {
     fluid_slots: Vec<[usize; 9]>,
     pub(super) flow: Vec<f64>,
     pub(super) work: super::solve::Work,
-    constant: Vec<f64>,
-    contact: Vec<f64>,
+    pub(super) constant: Vec<f64>,
+    pub(super) contact: Vec<f64>,
+    /// What holds the prescribed degrees of freedom at the last residual, N or N m; zero elsewhere.
+    pub(super) reaction: Vec<f64>,
+    /// Outer forces of an accepted step, and a term's share in them.
+    pub(super) outer: Vec<f64>,
+    pub(super) share: Vec<f64>,
     pub(super) pool: Option<Arc<ThreadPool>>,
 }
 
@@ -190,6 +195,9 @@ impl Balance {
             fluid_slots,
             constant: vec![0.0; n],
             contact: vec![0.0; n],
+            reaction: vec![0.0; n],
+            outer: vec![0.0; n],
+            share: vec![0.0; n],
             pool,
         })
     }
@@ -383,7 +391,7 @@ impl Balance {
             let weight = model.force_weight[dof];
             let total = self.residual[dof] + self.elastic[dof];
             scale = scale.max(self.residual[dof].abs() * weight);
-            self.residual[dof] = if model.prescribed[dof] { 0.0 } else { total };
+            (self.residual[dof], self.reaction[dof]) = if model.prescribed[dof] { (0.0, total) } else { (total, 0.0) };
             count(self.residual[dof].abs() * weight, dof);
         }
         if let Some(drag) = self.drag_per_slip(step) {

@@ -152,6 +152,8 @@ pub struct Specification {
     pub loads: Vec<(usize, Vec3)>,
     /// Gravity, m/s^2.
     pub gravity: Vec3,
+    /// Reynolds number of every node over its speed, s/m: density times size over viscosity, zero for dry ones; may be empty.
+    pub reynolds: Vec<f64>,
     /// Fluid.
     pub fluid: Option<FluidSpecification>,
     /// Contact.

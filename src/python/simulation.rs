@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
+use crate::dynamics::budget::Account;
 use crate::dynamics::control::Control;
 use crate::dynamics::predictor::{History, Sample};
 use crate::dynamics::scheme::Scheme;
@@ -252,8 +253,14 @@ impl Simulation {
         frame.set_item("motor_torque", PyArray1::from_vec(py, self.inner.motor_torques()))?;
         frame.set_item("minimum_gap", self.inner.smallest_gap().unwrap_or(f64::INFINITY))?;
         frame.set_item("contacts", self.inner.state().contacts.len())?;
+        frame.set_item("account", self.account(py))?;
         frame.set_item("energy", PyArray1::from_slice(py, &self.inner.energies()))?;
         Ok(frame)
+    }
+
+    /// Energies, balances and extremes so far, as `flagrs.budget` reads them.
+    fn account<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.state().account.numbers())
     }
 
     /// Counts and times since the start.
@@ -302,6 +309,7 @@ impl Simulation {
         out.set_item("motor_angles", PyArray1::from_slice(py, &state.motor_angles))?;
         out.set_item("contact_pairs", PyArray1::from_iter(py, pairs).reshape([state.contacts.len(), 2])?)?;
         out.set_item("contact_anchor", from_points(py, &state.contact_anchor)?)?;
+        out.set_item("account", PyArray1::from_slice(py, &state.account.numbers()))?;
         out.set_item("contact_forces", PyArray1::from_iter(py, state.contacts.iter().map(|(_, force)| *force)))?;
         Ok(out)
     }
@@ -310,6 +318,7 @@ impl Simulation {
     fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
         let current = self.inner.state();
         let flow = current.density.len();
+        let account = Account::from_numbers(&values(&saved.account));
         let mut state = State {
             time: first(&saved.time),
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
@@ -326,6 +335,7 @@ impl Simulation {
             },
             motor_angles: values(&saved.motor_angles),
             contacts: contacts(&saved),
+            account: account.unwrap_or_default(),
             contact_anchor: points(py, "contact_anchor", &saved.contact_anchor)?,
         };
         // Schemes without a force density of their own save an empty one; the next step finds it.
@@ -334,7 +344,8 @@ impl Simulation {
             state.density = vec![0.0; flow];
             state.history.past.iter_mut().for_each(|sample| sample.density = vec![0.0; flow]);
         }
-        let same = state.q.len() == current.q.len()
+        let same = account.is_some()
+            && state.q.len() == current.q.len()
             && state.velocity.len() == current.velocity.len()
             && state.frames.tangents.len() == current.frames.tangents.len()
             && state.frames.directors.len() == current.frames.directors.len()
@@ -394,6 +405,7 @@ struct StateInput<'py> {
     contact_pairs: PyReadonlyArray2<'py, i64>,
     contact_forces: PyReadonlyArray1<'py, f64>,
     contact_anchor: PyReadonlyArray2<'py, f64>,
+    account: PyReadonlyArray1<'py, f64>,
 }
 
 fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {

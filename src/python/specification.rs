@@ -112,6 +112,7 @@ pub struct SceneInput<'py> {
     clamps: Vec<ClampInput<'py>>,
     loads: Vec<(usize, [f64; 3])>,
     gravity: [f64; 3],
+    reynolds: PyReadonlyArray1<'py, f64>,
     fluid: Option<FluidInput<'py>>,
     contact: Option<ContactInput>,
 }
@@ -164,6 +165,7 @@ impl SceneInput<'_> {
                 .collect(),
             loads: self.loads.into_iter().map(|(node, force)| (node, Vec3::from(force))).collect(),
             gravity: Vec3::from(self.gravity),
+            reynolds: values(&self.reynolds),
             fluid: self.fluid.map(fluid),
             contact: self.contact.map(contact),
             nodes,

@@ -116,6 +116,7 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
         clamps: vec![],
         loads: vec![],
         gravity: Vec3::zeros(),
+        reynolds: vec![],
         fluid: Some(FluidSpecification {
             viscosity: substance.viscosity,
             model: FluidModelSpecification::StokesletSegments {

@@ -96,3 +96,12 @@ def test_head_between_edges_without_a_hinge_is_refused():
     hinges = [pair for pair in rod.hinge_array().tolist() if pair != [0, 1]]
     with pytest.raises(flagrs.SceneError, match=r"head\.node.*no hinge joins"):
         scene.replace(rods=(rod.replace(hinges=hinges),))
+
+
+def test_head_rate_is_read_off_where_the_head_lies_on_the_axis_of_the_shaft():
+    speed = flagrs.rpm(60.0)
+    scene = uniflagellar((-10e-3, 0.0, 0.0), speed)
+    simulation = flagrs.Simulation(scene, dt=1e-3)
+    trajectory = simulation.run(until=0.02, save_every=2e-3, path=False)
+    _, turning, _ = rigid_motion(scene, speed)
+    assert trajectory.head_rate() == pytest.approx(turning[0], rel=1e-2)

@@ -25,7 +25,7 @@ def problems(scene: Scene) -> list[SceneError]:
     found = list(_indices(scene))
     if found:
         return found
-    return [*_head(scene), *_motors(scene), *_clamps(scene)]
+    return [*_head(scene), *_motors(scene), *_clamps(scene), *_buoyancy(scene)]
 
 
 def _indices(scene: Scene) -> Iterator[SceneError]:
@@ -53,6 +53,13 @@ def _named_parts(scene: Scene) -> Iterator[tuple[str, Head | Motor | Clamp | Poi
     for name in ("motors", "clamps", "loads"):
         for position, part in enumerate(getattr(scene, name)):
             yield f"{name}[{position}]", part
+
+
+def _buoyancy(scene: Scene) -> Iterator[SceneError]:
+    fluid = scene.fluid
+    if fluid is not None and fluid.density is None and scene.gravity.any():
+        allowed = "given [kg/m^3] in a scene with gravity: 1000 for water, 0 to leave buoyancy out"
+        yield not_allowed("fluid.density", None, allowed)
 
 
 def _head(scene: Scene) -> Iterator[SceneError]:
