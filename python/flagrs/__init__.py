@@ -2,6 +2,7 @@
 
 from flagrs import contact, fluid, scenarios
 from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError
+from flagrs.guards import EnergyWarning, FlagrsWarning, MeshWarning, ReynoldsWarning, StrainWarning
 from flagrs.scene import (
     Clamp,
     Contact,
@@ -26,17 +27,22 @@ __all__ = [
     "Clamp",
     "Contact",
     "ConvergenceError",
+    "EnergyWarning",
     "FileError",
     "FlagrsError",
+    "FlagrsWarning",
     "Fluid",
     "Head",
     "Material",
+    "MeshWarning",
     "Motor",
     "PointLoad",
+    "ReynoldsWarning",
     "Rod",
     "Scene",
     "SceneError",
     "Simulation",
+    "StrainWarning",
     "Suggestion",
     "Table",
     "Trajectory",

@@ -10,9 +10,10 @@ import numpy as np
 
 from flagrs.contact_scales import barrier_stiffness, slip_velocity
 from flagrs.errors import SceneError, not_allowed
-from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology
+from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology, scene_checks
 from flagrs.scene.signal import Signal
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
+from flagrs.time_step import rod_size
 
 #: Excluded rest arc length over the sum of radii where a contact gives none; see docs/theory/contact.md.
 EXCLUSION_FACTOR = math.pi / 2.0
@@ -53,9 +54,28 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "clamps": [_clamp(scene, clamp) for clamp in scene.clamps],
         "loads": [(scene.node_offset(load.rod) + load.node, load.force.tolist()) for load in scene.loads],
         "gravity": scene.gravity.tolist(),
+        "reynolds": reynolds_per_speed(scene),
         "fluid": None if scene.fluid is None else _fluid(scene, scene.fluid),
         "contact": None if scene.contact is None else _contact(scene, scene.contact),
     }
+
+
+def reynolds_per_speed(scene: Scene) -> FloatArray:
+    """Return each node's Reynolds number over its speed (N,) [s/m], 0 for dry ones.
+
+    It is density times size over viscosity, with the size of the node's rod across its axis, the radius of a
+    helix (`flagrs.time_step.size`), or the radius of the head on the head's node.
+    """
+    fluid = scene.fluid
+    sizes = np.zeros(scene.node_count)
+    if fluid is None:
+        return sizes
+    for number, rod in enumerate(scene.rods):
+        wet = np.unique(rod.edge_array()[rod.immersed_array()])
+        sizes[scene.node_offset(number) + wet] = rod_size(rod)
+    if scene.head is not None:
+        sizes[scene.node_offset(scene.head.rod) + scene.head.node] = scene.head.radius
+    return sizes * (fluid.density_for_inertia / fluid.viscosity)
 
 
 def _theta(rod: Rod) -> FloatArray:
@@ -122,25 +142,14 @@ def hinge_of_motor(rod: Rod, motor: Motor) -> tuple[int, bool]:
 
 def _head(scene: Scene, head: Head) -> dict[str, Any]:
     viscosity = 0.0 if scene.fluid is None else scene.fluid.viscosity
-    before, after = head_neighbours(scene.rods[head.rod], head)
-    offset = scene.node_offset(head.rod)
+    offset = scene.edge_offset(head.rod)
     return {
-        "node": offset + head.node,
-        "neighbours": [offset + before, offset + after],
+        "node": scene.node_offset(head.rod) + head.node,
+        "edges": [offset + edge for edge in scene_checks.edges_of_head(scene, head)],
         "translation": head.C_t * 6.0 * math.pi * viscosity * head.radius,
         "rotation": head.C_r * 8.0 * math.pi * viscosity * head.radius**3,
         "mass": head.mass,
     }
-
-
-def head_neighbours(rod: Rod, head: Head) -> tuple[int, int]:
-    """Return the two nodes next to the head's node, in the order of the rod's edges."""
-    neighbours = [
-        rod_topology.far_end(rod.edge_array(), edge, head.node)
-        for edge, pair in enumerate(rod.edge_array().tolist())
-        if head.node in pair
-    ]
-    return neighbours[0], neighbours[1]
 
 
 def _clamp(scene: Scene, clamp: Clamp) -> dict[str, Any]:
@@ -161,7 +170,7 @@ def _fluid(scene: Scene, fluid: Fluid) -> dict[str, Any]:
         "viscosity": fluid.viscosity,
         "immersed": (immersed & (fluid.model != "none")).tolist(),
         "twist_drag": fluid.twist_drag,
-        "density": fluid.density,
+        "density": fluid.density_for_buoyancy,
         "far_field_error": fluid.far_field_error,
         "far_field_nodes": fluid.crossover,
         "epsilon": None if local else fluid.epsilon_array(radius),

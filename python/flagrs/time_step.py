@@ -29,10 +29,11 @@ def size(scene: Scene) -> float:
     The largest over the rods of the root mean square distance of the rest shape from its principal axis, the
     helix radius of a flagellum; for rods straighter than that, a twentieth of the length.
     """
-    return max(_size_of(rod) for rod in scene.rods)
+    return max(rod_size(rod) for rod in scene.rods)
 
 
-def _size_of(rod: Rod) -> float:
+def rod_size(rod: Rod) -> float:
+    """Return the size of one rod across its axis [m], as `size` takes it."""
     nodes = rod.rest_array()
     spread = np.linalg.svd(nodes - nodes.mean(axis=0), compute_uv=False)
     across = float(np.sqrt((spread[1:] ** 2).sum() / len(nodes)))

@@ -119,8 +119,13 @@ pub(super) struct Balance {
     pub(super) flow: Vec<f64>,
     pub(super) work: super::solve::Work,
     pub(super) targets: Targets,
-    constant: Vec<f64>,
-    contact: Vec<f64>,
+    pub(super) constant: Vec<f64>,
+    pub(super) contact: Vec<f64>,
+    /// What holds the prescribed degrees of freedom at the last residual, N or N m; zero elsewhere.
+    pub(super) reaction: Vec<f64>,
+    /// Outer forces of an accepted step, and a term's share in them.
+    pub(super) outer: Vec<f64>,
+    pub(super) share: Vec<f64>,
     pub(super) threads: Threads,
     pub(super) interrupt: Interrupt,
 }
@@ -181,6 +186,9 @@ impl Balance {
             fluid_slots,
             constant: vec![0.0; n],
             contact: vec![0.0; n],
+            reaction: vec![0.0; n],
+            outer: vec![0.0; n],
+            share: vec![0.0; n],
             threads,
             interrupt: Interrupt::default(),
         })
@@ -369,7 +377,7 @@ impl Balance {
         self.targets.measure(model, &self.residual);
         for dof in 0..model.dof_count {
             let total = self.residual[dof] + self.elastic[dof];
-            self.residual[dof] = if model.prescribed[dof] { 0.0 } else { total };
+            (self.residual[dof], self.reaction[dof]) = if model.prescribed[dof] { (0.0, total) } else { (total, 0.0) };
         }
         self.targets.size(model, &self.residual, &self.slip, &self.fluid_dofs)
     }

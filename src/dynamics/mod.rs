@@ -23,6 +23,7 @@
 pub mod adaptive;
 pub mod balance;
 mod barrier_term;
+pub mod budget;
 pub mod contact_model;
 pub mod control;
 pub mod diagnostics;

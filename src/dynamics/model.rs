@@ -1,5 +1,6 @@
 //! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
 
+use super::budget::{self, Account};
 use super::contact_model::{ContactModel, Overlap};
 use super::control::Control;
 use super::filaments::Filaments;
@@ -16,7 +17,7 @@ use crate::elastic::motors::{Drive, Motor};
 use crate::elastic::stretching::Stretching;
 use crate::elastic::twisting::Twisting;
 use crate::fluid::FluidModel;
-use crate::fluid::head::Head;
+use crate::fluid::head::{Head, MOST_EDGES};
 use crate::fluid::product::FarFieldChoice;
 use crate::fluid::rft::ResistiveForce;
 use crate::fluid::rss::StokesletSegments;
@@ -98,6 +99,14 @@ pub struct Model {
     pub(super) round_off: RoundOff,
     pub(super) mass: Vec<f64>,
     pub(super) contact: Option<ContactModel>,
+    /// Point loads, and weights less buoyancy, on every degree of freedom, N.
+    pub(super) point_loads: Vec<f64>,
+    pub(super) weights: Vec<f64>,
+    /// Connected part of every node, and which parts nothing holds.
+    pub(super) part_of_node: Vec<usize>,
+    pub(super) free_parts: Vec<bool>,
+    /// Regularization of the immersed edges, m; zero for others.
+    pub(super) regularization: Vec<f64>,
     pub(super) specification: Specification,
 }
 
@@ -143,7 +152,16 @@ impl Model {
             .as_ref()
             .map(|contact| ContactModel::new(contact, &network, &rest.lengths, &specification.radius));
         let state = initial_state(&specification, &network, dof_count);
+        let held: Vec<bool> = (0..network.node_count()).map(|k| prescribed[network.node_dofs()[k]]).collect();
+        let (part_of_node, mut free_parts) = budget::parts(network.edges(), &held, contact.is_some());
+        let turned = network.edges().iter().zip(network.edge_dofs()).filter(|(_, dof)| prescribed[**dof]);
+        turned.for_each(|(&[i, _], _)| free_parts[part_of_node[i]] = false);
         let model = Self {
+            point_loads: point_loads(&specification, &network, dof_count),
+            weights: weights(&specification, &network, dof_count, &rest.lengths),
+            part_of_node,
+            free_parts,
+            regularization: regularization(&specification),
             dof_count,
             stretching,
             hinges,
@@ -287,6 +305,15 @@ fn check(specification: &Specification) -> Result<(), ModelError> {
     positive("radius", &specification.radius)?;
     positive("stretching", &specification.stretching)?;
     positive("twisting", &specification.twisting)?;
+    if !specification.reynolds.is_empty() {
+        expect("reynolds", specification.reynolds.len(), nodes)?;
+    }
+    if let Some(head) = &specification.head
+        && !(1..=MOST_EDGES).contains(&head.edges.len())
+    {
+        let (field, value) = ("head.edges".to_owned(), head.edges.len() as f64);
+        return Err(ModelError::Value { field, value, allowed: "1 to 6 edges fixed to the head" });
+    }
     for (k, ei) in specification.bending.iter().enumerate() {
         let determinant = ei[0][0] * ei[1][1] - ei[0][1] * ei[1][0];
         if !(ei[0][0] > 0.0 && determinant > 0.0 && ei[0][1] == ei[1][0]) {
@@ -378,6 +405,7 @@ fn initial_state(specification: &Specification, network: &Network, dof_count: us
         tensions: vec![0.0; network.edges().len()],
         motor_angles: vec![0.0; specification.motors.len()],
         contacts: Vec::new(),
+        account: Account::default(),
         contact_anchor: Vec::new(),
     }
 }
@@ -454,24 +482,46 @@ fn dissipative_terms(
         }
     }
     if let Some(head) = &specification.head {
-        terms.push(Box::new(Head::new(network, head.node, head.neighbours, head.translation, head.rotation)));
+        let drag = [head.translation, head.rotation];
+        terms.push(Box::new(Head::new(network, head.node, head.edges.clone(), lengths, drag)));
     }
-    let forces = loads(specification, network, dof_count, lengths);
+    let mut forces = point_loads(specification, network, dof_count);
+    let weights = weights(specification, network, dof_count, lengths);
+    forces.iter_mut().zip(weights).for_each(|(force, weight)| *force += weight);
     if forces.iter().any(|&force| force != 0.0) {
         terms.push(Box::new(Loads::new(forces)));
     }
     terms
 }
 
-fn loads(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
+/// Regularization of every immersed edge, m, and zero for dry ones and other models.
+fn regularization(specification: &Specification) -> Vec<f64> {
+    let mut out = vec![0.0; specification.edges.len()];
+    if let Some(fluid) = &specification.fluid
+        && let FluidModelSpecification::StokesletSegments { epsilon, .. } = &fluid.model
+    {
+        let wet = fluid.immersed.iter().zip(epsilon);
+        out.iter_mut().zip(wet).for_each(|(out, (&wet, &epsilon))| *out = if wet { epsilon } else { 0.0 });
+    }
+    out
+}
+
+fn point_loads(specification: &Specification, network: &Network, dof_count: usize) -> Vec<f64> {
+    let mut forces = vec![0.0; dof_count];
+    for &(node, force) in &specification.loads {
+        let dof = network.node_dofs()[node];
+        (0..3).for_each(|c| forces[dof + c] += force[c]);
+    }
+    forces
+}
+
+/// Weight less buoyancy on every degree of freedom, N.
+fn weights(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
     let mut forces = vec![0.0; dof_count];
     let mut add = |node: usize, force: Vec3| {
         let dof = network.node_dofs()[node];
         (0..3).for_each(|c| forces[dof + c] += force[c]);
     };
-    for &(node, force) in &specification.loads {
-        add(node, force);
-    }
     for (k, &[i, j]) in network.edges().iter().enumerate() {
         let buoyancy = specification.fluid.as_ref().map_or(0.0, |fluid| fluid.density);
         let volume = PI * specification.radius[k].powi(2) * lengths[k];

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::balance::{Balance, Step, Unknowns};
+use super::budget::Accepted;
 use super::contact_model::ContactModel;
 use super::control::Control;
 use super::failure::{StepError, TryError};
@@ -164,6 +165,7 @@ impl Simulation {
         state.contact_anchor.clear();
         state.contacts.clear();
         state.control = Control::default();
+        state.account = super::budget::Account::default();
         state.frames.follow_turned_over(network, nodes);
         self.adopt(state)
     }
@@ -241,6 +243,7 @@ impl Simulation {
         let (t0, t1) = (self.state.time, self.state.time + dt);
         self.balance.interrupt.begin();
         let mut trial = std::mem::take(&mut self.trial);
+        self.open_account();
         let prepared = self.prepare(&mut trial, t0, t1);
         let solved = prepared.and_then(|motors| self.solve(motors, dt, order, &mut trial));
         self.trial = trial;
@@ -397,13 +400,33 @@ impl Simulation {
         })
     }
 
+    /// Begins the account of energies at the present state, if none has begun.
+    fn open_account(&mut self) {
+        let Self { state, balance, model, scheme, .. } = self;
+        if state.account.start.is_none() && balance.energies(model, state).is_some() {
+            let stored = balance.stored(model, &state.q, &state.velocity, scheme.has_inertia());
+            state.account.begin(state.time, stored);
+        }
+    }
+
     fn accept(&mut self, angles: Vec<f64>, dt: f64, order: usize, missed: &[f64]) {
         let motors = (Vec::new(), Vec::new());
         let step = Step::new(self.scheme, &self.state, dt, order, motors);
         let increment = step.increment();
         let velocity: Vec<f64> =
             self.trial.q.iter().enumerate().map(|(dof, &value)| increment.rate_of(dof, value)).collect();
+        let account = self.balance.account(&Accepted {
+            model: &self.model,
+            step: &step,
+            q: &self.trial.q,
+            velocity: &velocity,
+            density: &self.trial.density,
+            motor_angles: &angles,
+            dt,
+            order,
+        });
         let state = &mut self.state;
+        state.account = account;
         let replaced = Sample {
             time: state.time,
             q: std::mem::replace(&mut state.q, self.trial.q.clone()),

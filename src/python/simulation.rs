@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
+use crate::dynamics::budget::Account;
 use crate::dynamics::control::Control;
 use crate::dynamics::failure::StepError;
 use crate::dynamics::predictor::{History, Sample};
@@ -231,8 +232,14 @@ impl Simulation {
         frame.set_item("motor_torque", PyArray1::from_vec(py, self.inner.motor_torques()))?;
         frame.set_item("minimum_gap", self.inner.smallest_gap().unwrap_or(f64::INFINITY))?;
         frame.set_item("contacts", self.inner.state().contacts.len())?;
+        frame.set_item("account", self.account(py))?;
         frame.set_item("energy", PyArray1::from_slice(py, &self.inner.energies()))?;
         Ok(frame)
+    }
+
+    /// Energies, balances and extremes so far, as `flagrs.budget` reads them.
+    fn account<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.state().account.numbers())
     }
 
     /// Counts and times since the start.
@@ -281,14 +288,21 @@ impl Simulation {
         out.set_item("motor_angles", PyArray1::from_slice(py, &state.motor_angles))?;
         out.set_item("contact_pairs", PyArray1::from_iter(py, pairs).reshape([state.contacts.len(), 2])?)?;
         out.set_item("contact_anchor", from_points(py, &state.contact_anchor)?)?;
+        out.set_item("account", PyArray1::from_slice(py, &state.account.numbers()))?;
         out.set_item("contact_forces", PyArray1::from_iter(py, state.contacts.iter().map(|(_, force)| *force)))?;
         Ok(out)
     }
 
     /// Takes over a state saved by `state()` of a simulation of the same scene.
     fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
+<<<<<<< HEAD
         saved.check_shapes(py, self.inner.model().dof_count())?;
         let flow = self.inner.state().density.len();
+=======
+        let current = self.inner.state();
+        let flow = current.density.len();
+        let account = Account::from_numbers(&values(&saved.account));
+>>>>>>> guards
         let mut state = State {
             time: first(&saved.time),
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
@@ -304,7 +318,12 @@ impl Simulation {
                 twists: values(&saved.twists),
             },
             motor_angles: values(&saved.motor_angles),
+<<<<<<< HEAD
             contacts: contacts(py, &saved)?,
+=======
+            contacts: contacts(&saved),
+            account: account.unwrap_or_default(),
+>>>>>>> guards
             contact_anchor: points(py, "contact_anchor", &saved.contact_anchor)?,
         };
         // Schemes without a force density of their own save an empty one; the next step finds it.
@@ -313,6 +332,42 @@ impl Simulation {
             state.density = vec![0.0; flow];
             state.history.past.iter_mut().for_each(|sample| sample.density = vec![0.0; flow]);
         }
+<<<<<<< HEAD
+=======
+        let same = account.is_some()
+            && state.q.len() == current.q.len()
+            && state.velocity.len() == current.velocity.len()
+            && state.frames.tangents.len() == current.frames.tangents.len()
+            && state.frames.directors.len() == current.frames.directors.len()
+            && state.frames.twists.len() == current.frames.twists.len()
+            && state.motor_angles.len() == current.motor_angles.len()
+            && state.density.len() == flow
+            && state.tensions.len() == current.tensions.len()
+            && [0, self.inner.model().network().node_count()].contains(&state.contact_anchor.len())
+            && saved.history_states.shape() == [state.history.past.len(), current.q.len()]
+            && saved.history_velocities.shape() == [state.history.past.len(), current.q.len()]
+            && saved.history_densities.shape() == [state.history.past.len(), kept];
+        let bodies = self.inner.model().body_count();
+        let pairs = saved.contact_pairs.as_array();
+        let known = pairs.ncols() == 2
+            && pairs.nrows() == saved.contact_forces.as_array().len()
+            && pairs.iter().all(|&body| usize::try_from(body).is_ok_and(|body| body < bodies));
+        let past = state.history.past.iter();
+        let present = [&state.q, &state.velocity, &state.density, &state.tensions];
+        let finite = present
+            .into_iter()
+            .chain([&state.frames.twists, &state.motor_angles])
+            .chain(past.flat_map(|sample| [&sample.q, &sample.velocity, &sample.density]))
+            .flatten()
+            .chain(state.contacts.iter().map(|(_, force)| force))
+            .chain(state.contact_anchor.iter().flatten())
+            .chain(state.history.past.iter().map(|sample| &sample.time))
+            .chain([&state.time, &state.control.dt])
+            .all(|value| value.is_finite());
+        if !(same && known && finite) {
+            return Err(scene_error(py, "state", "the saved state", "a finite state of the same scene"));
+        }
+>>>>>>> guards
         self.inner.adopt(state).map_err(|error| model_error(py, &error))
     }
 }
@@ -366,6 +421,7 @@ struct StateInput<'py> {
     contact_pairs: PyReadonlyArray2<'py, i64>,
     contact_forces: PyReadonlyArray1<'py, f64>,
     contact_anchor: PyReadonlyArray2<'py, f64>,
+    account: PyReadonlyArray1<'py, f64>,
 }
 
 fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {

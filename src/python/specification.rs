@@ -48,7 +48,7 @@ struct MotorInput<'py> {
 #[pyo3(from_item_all)]
 struct HeadInput {
     node: usize,
-    neighbours: [usize; 2],
+    edges: Vec<usize>,
     translation: f64,
     rotation: f64,
     mass: f64,
@@ -112,6 +112,7 @@ pub struct SceneInput<'py> {
     clamps: Vec<ClampInput<'py>>,
     loads: Vec<(usize, [f64; 3])>,
     gravity: [f64; 3],
+    reynolds: PyReadonlyArray1<'py, f64>,
     fluid: Option<FluidInput<'py>>,
     contact: Option<ContactInput>,
 }
@@ -147,7 +148,7 @@ impl SceneInput<'_> {
                 .collect(),
             head: self.head.map(|head| HeadSpecification {
                 node: head.node,
-                neighbours: head.neighbours,
+                edges: head.edges,
                 translation: head.translation,
                 rotation: head.rotation,
                 mass: head.mass,
@@ -164,6 +165,7 @@ impl SceneInput<'_> {
                 .collect(),
             loads: self.loads.into_iter().map(|(node, force)| (node, Vec3::from(force))).collect(),
             gravity: Vec3::from(self.gravity),
+            reynolds: values(&self.reynolds),
             fluid: self.fluid.map(fluid),
             contact: self.contact.map(contact),
             nodes,
