@@ -13,6 +13,7 @@ from flagrs.scene import (
     Rod,
     Scene,
     Table,
+    TimeFunction,
 )
 from flagrs.simulation import Simulation
 from flagrs.suggest import Suggestion, suggest
@@ -35,6 +36,7 @@ __all__ = [
     "Simulation",
     "Suggestion",
     "Table",
+    "TimeFunction",
     "Trajectory",
     "contact",
     "fluid",

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from flagrs.contact_scales import barrier_stiffness, slip_velocity
 from flagrs.errors import SceneError, not_allowed
-from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology
-from flagrs.scene.signal import Signal
+from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, TimeFunction, rod_topology
+from flagrs.scene.signal import RESOLUTION, Signal
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
 
 #: Excluded rest arc length over the sum of radii where a contact gives none; see docs/theory/contact.md.
@@ -48,9 +47,9 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "twisting": np.concatenate([rod.GJ_array() for rod in rods]),
         "natural_curvature": np.concatenate([_natural_curvature(rod) for rod in rods]),
         "natural_twist": np.concatenate([_natural_twist(rod) for rod in rods]),
-        "motors": [_motor(scene, motor) for motor in scene.motors],
+        "motors": [_motor(scene, k, motor) for k, motor in enumerate(scene.motors)],
         "head": None if scene.head is None else _head(scene, scene.head),
-        "clamps": [_clamp(scene, clamp) for clamp in scene.clamps],
+        "clamps": [_clamp(scene, k, clamp) for k, clamp in enumerate(scene.clamps)],
         "loads": [(scene.node_offset(load.rod) + load.node, load.force.tolist()) for load in scene.loads],
         "gravity": scene.gravity.tolist(),
         "fluid": None if scene.fluid is None else _fluid(scene, scene.fluid),
@@ -78,13 +77,18 @@ def _directors(scene: Scene) -> list[tuple[int, list[float]]]:
     return [(edge, director.tolist()) for edge, director in given if director is not None]
 
 
-def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[[float], float]:
+def _signal(signal: Signal, field: str) -> Any:
+    """Return a number, samples (times, values), or a function, its breaks, resolution and field."""
     if isinstance(signal, Table):
         return np.array(signal.times), np.array(signal.values)
-    return signal
+    if isinstance(signal, TimeFunction):
+        return signal.function, np.array(signal.breaks), signal.resolution, field
+    if callable(signal):
+        return signal, np.zeros(0), RESOLUTION, field
+    return float(signal)
 
 
-def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
+def _motor(scene: Scene, position: int, motor: Motor) -> dict[str, Any]:
     rod = scene.rods[motor.rod]
     hinge, second = hinge_of_motor(rod, motor)
     offset = sum(len(other.hinge_array()) for other in scene.rods[: motor.rod])
@@ -92,7 +96,7 @@ def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
         "hinge": offset + hinge,
         "shaft_second": second,
         "by_torque": motor.drive == "torque",
-        "signal": _signal(motor.signal),
+        "signal": _signal(motor.signal, f"motors[{position}].{motor.drive}"),
     }
 
 
@@ -143,12 +147,12 @@ def head_neighbours(rod: Rod, head: Head) -> tuple[int, int]:
     return neighbours[0], neighbours[1]
 
 
-def _clamp(scene: Scene, clamp: Clamp) -> dict[str, Any]:
+def _clamp(scene: Scene, position: int, clamp: Clamp) -> dict[str, Any]:
     nodes, edges = scene.node_offset(clamp.rod), scene.edge_offset(clamp.rod)
     return {
         "nodes": [nodes + node for node in clamp.nodes],
         "edges": [edges + edge for edge in clamp.edges],
-        "angular_velocity": _signal(clamp.angular_velocity),
+        "angular_velocity": _signal(clamp.angular_velocity, f"clamps[{position}].angular_velocity"),
         "velocity": clamp.velocity.tolist(),
     }
 

@@ -1,5 +1,6 @@
 //! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
 
+use super::breaks::Breaks;
 use super::contact_model::{ContactModel, Overlap};
 use super::control::Control;
 use super::predictor::History;
@@ -86,6 +87,7 @@ pub struct Model {
     pub(super) motors: Vec<Motor>,
     pub(super) clamps: Vec<Clamp>,
     pub(super) prescribed: Vec<bool>,
+    pub(super) breaks: Breaks,
     pub(super) pattern: Pattern,
     /// Turns residuals into forces: 1 for positions, one over a length for angles.
     pub(super) force_weight: Vec<f64>,
@@ -140,7 +142,9 @@ impl Model {
             .as_ref()
             .map(|contact| ContactModel::new(contact, &network, &rest.lengths, &specification.radius));
         let state = initial_state(&specification, &network, dof_count);
+        let turning = clamps.iter().filter(|clamp| !clamp.edges.is_empty()).map(|clamp| &clamp.angular_velocity);
         let model = Self {
+            breaks: Breaks::new(&motors, turning),
             dof_count,
             stretching,
             hinges,

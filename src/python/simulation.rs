@@ -10,6 +10,7 @@ use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
 use crate::dynamics::control::Control;
+use crate::dynamics::failure::StepError;
 use crate::dynamics::predictor::{History, Sample};
 use crate::dynamics::scheme::Scheme;
 use crate::dynamics::simulation as core;
@@ -241,6 +242,7 @@ impl Simulation {
     /// Everything a saved frame holds but the time, as a mapping of arrays.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let frame = PyDict::new(py);
+        let speeds = self.inner.motor_speeds().map_err(|error| step_error(py, StepError::Signal(error)))?;
         let density = self.inner.force_density().map_err(|error| linear_error(py, &error))?;
         frame.set_item("time", self.inner.state().time)?;
         frame.set_item("nodes", self.nodes(py)?)?;
@@ -248,7 +250,7 @@ impl Simulation {
         frame.set_item("velocities", self.velocities(py)?)?;
         frame.set_item("force_density", from_flat(py, density, 3)?)?;
         frame.set_item("motor_angle", PyArray1::from_slice(py, &self.inner.state().motor_angles))?;
-        frame.set_item("motor_speed", PyArray1::from_vec(py, self.inner.motor_speeds()))?;
+        frame.set_item("motor_speed", PyArray1::from_vec(py, speeds))?;
         frame.set_item("motor_torque", PyArray1::from_vec(py, self.inner.motor_torques()))?;
         frame.set_item("minimum_gap", self.inner.smallest_gap().unwrap_or(f64::INFINITY))?;
         frame.set_item("contacts", self.inner.state().contacts.len())?;
@@ -289,7 +291,7 @@ impl Simulation {
         };
         out.set_item("density", PyArray1::from_slice(py, &state.density))?;
         out.set_item("tensions", PyArray1::from_slice(py, &state.tensions))?;
-        out.set_item("control_step", PyArray1::from_slice(py, &[state.control.dt]))?;
+        out.set_item("control_step", PyArray1::from_slice(py, &control_numbers(&state.control)))?;
         out.set_item("control_order", PyArray1::from_slice(py, &[state.control.order as u64]))?;
         out.set_item("history_times", PyArray1::from_iter(py, past.iter().map(|sample| sample.time)))?;
         out.set_item("history_states", rows(|sample| &sample.q, state.q.len())?)?;
@@ -317,7 +319,7 @@ impl Simulation {
             velocity: values(&saved.velocity),
             density: values(&saved.density),
             tensions: values(&saved.tensions),
-            control: Control { dt: first(&saved.control_step), order: whole(&saved.control_order) },
+            control: control(&saved),
             history: History { past: past(&saved), order: whole(&saved.history_order) },
             frames: ReferenceFrames {
                 tangents: points(py, "tangents", &saved.tangents)?,
@@ -402,6 +404,22 @@ fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
 
 fn whole(array: &PyReadonlyArray1<'_, u64>) -> usize {
     array.as_array().first().map_or(0, |&value| value as usize)
+}
+
+/// What [`control`] reads, but for the order.
+fn control_numbers(control: &Control) -> [f64; 3] {
+    [control.dt, control.ceiling, f64::from(u8::from(control.at_jump))]
+}
+
+/// Size and order of the next step; files of before there was a ceiling have none.
+fn control(saved: &StateInput<'_>) -> Control {
+    let number = |k: usize| saved.control_step.as_array().get(k).copied();
+    Control {
+        dt: first(&saved.control_step),
+        order: whole(&saved.control_order),
+        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).unwrap_or(f64::INFINITY),
+        at_jump: number(2).is_some_and(|flag| flag != 0.0),
+    }
 }
 
 fn past(saved: &StateInput<'_>) -> Vec<Sample> {
