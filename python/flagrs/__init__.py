@@ -14,6 +14,7 @@ from flagrs.scene import (
     Rod,
     Scene,
     Table,
+    TimeFunction,
 )
 from flagrs.simulation import Simulation
 from flagrs.suggest import Suggestion, suggest
@@ -45,6 +46,7 @@ __all__ = [
     "StrainWarning",
     "Suggestion",
     "Table",
+    "TimeFunction",
     "Trajectory",
     "__version__",
     "contact",

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from flagrs.contact_scales import barrier_stiffness, slip_velocity
 from flagrs.errors import SceneError, not_allowed
-from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology, scene_checks
-from flagrs.scene.signal import Signal
+from flagrs.scene import (
+    Clamp,
+    Contact,
+    Fluid,
+    Head,
+    Motor,
+    Rod,
+    Scene,
+    Table,
+    TimeFunction,
+    rod_topology,
+    scene_checks,
+)
+from flagrs.scene.signal import RESOLUTION, Signal
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
 from flagrs.time_step import rod_size
 
@@ -49,9 +60,9 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "twisting": np.concatenate([rod.GJ_array() for rod in rods]),
         "natural_curvature": np.concatenate([_natural_curvature(rod) for rod in rods]),
         "natural_twist": np.concatenate([_natural_twist(rod) for rod in rods]),
-        "motors": [_motor(scene, motor) for motor in scene.motors],
+        "motors": [_motor(scene, k, motor) for k, motor in enumerate(scene.motors)],
         "head": None if scene.head is None else _head(scene, scene.head),
-        "clamps": [_clamp(scene, clamp) for clamp in scene.clamps],
+        "clamps": [_clamp(scene, k, clamp) for k, clamp in enumerate(scene.clamps)],
         "loads": [(scene.node_offset(load.rod) + load.node, load.force.tolist()) for load in scene.loads],
         "gravity": scene.gravity.tolist(),
         "reynolds": reynolds_per_speed(scene),
@@ -98,13 +109,18 @@ def _directors(scene: Scene) -> list[tuple[int, list[float]]]:
     return [(scene.edge_offset(k), director.tolist()) for k, director in given]
 
 
-def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[[float], float]:
+def _signal(signal: Signal, field: str) -> Any:
+    """Return a number, samples (times, values), or a function, its breaks, resolution and field."""
     if isinstance(signal, Table):
         return np.array(signal.times), np.array(signal.values)
-    return signal
+    if isinstance(signal, TimeFunction):
+        return signal.function, np.array(signal.breaks), signal.resolution, field
+    if callable(signal):
+        return signal, np.zeros(0), RESOLUTION, field
+    return float(signal)
 
 
-def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
+def _motor(scene: Scene, position: int, motor: Motor) -> dict[str, Any]:
     rod = scene.rods[motor.rod]
     hinge, second = hinge_of_motor(rod, motor)
     offset = scene.hinge_offset(motor.rod)
@@ -112,7 +128,7 @@ def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
         "hinge": offset + hinge,
         "shaft_second": second,
         "by_torque": motor.drive == "torque",
-        "signal": _signal(motor.signal),
+        "signal": _signal(motor.signal, f"motors[{position}].{motor.drive}"),
     }
 
 
@@ -152,12 +168,12 @@ def _head(scene: Scene, head: Head) -> dict[str, Any]:
     }
 
 
-def _clamp(scene: Scene, clamp: Clamp) -> dict[str, Any]:
+def _clamp(scene: Scene, position: int, clamp: Clamp) -> dict[str, Any]:
     nodes, edges = scene.node_offset(clamp.rod), scene.edge_offset(clamp.rod)
     return {
         "nodes": [nodes + node for node in clamp.nodes],
         "edges": [edges + edge for edge in clamp.edges],
-        "angular_velocity": _signal(clamp.angular_velocity),
+        "angular_velocity": _signal(clamp.angular_velocity, f"clamps[{position}].angular_velocity"),
         "velocity": clamp.velocity.tolist(),
     }
 

@@ -303,6 +303,18 @@ impl Balance {
         self.targets.size(model, &self.residual, &self.slip, &self.fluid_dofs).merit
     }
 
+    /// Moves the configuration alone to given degrees of freedom; whether they are one.
+    pub fn place(&mut self, model: &Model, step: &Step, q: &[f64]) -> bool {
+        self.shafts.clear();
+        self.shafts.extend(model.motors.iter().zip(&step.motor_angles).map(|(motor, &angle)| motor.shaft(angle, q)));
+        self.configuration.update(&model.network, q, &step.state.frames, &self.shafts)
+    }
+
+    /// Takes the fluid's equation for solved.
+    pub fn forget_slip(&mut self) {
+        self.slip.fill(0.0);
+    }
+
     /// Residual at a trial; `None` if it is not a configuration.
     pub fn evaluate(
         &mut self,
@@ -319,9 +331,7 @@ impl Balance {
 
     fn residual(&mut self, model: &Model, step: &Step, trial: &Unknowns, statistics: &mut Statistics) -> Option<Size> {
         let q = &trial.q;
-        self.shafts.clear();
-        self.shafts.extend(model.motors.iter().zip(&step.motor_angles).map(|(motor, &angle)| motor.shaft(angle, q)));
-        if !self.configuration.update(&model.network, q, &step.state.frames, &self.shafts) {
+        if !self.place(model, step, q) {
             return None;
         }
         let increment = step.increment();

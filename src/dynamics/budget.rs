@@ -186,7 +186,7 @@ impl Balance {
             Some(mobility) => mobility.weigh(accepted.density, &mut self.flow),
             None => {
                 gather(&self.fluid_dofs, |dof| velocity[dof], &mut self.flow);
-                if fluid.resist(&mut self.flow, self.pool.as_deref()).is_err() {
+                if fluid.resist(&mut self.flow, self.threads.pool().as_deref()).is_err() {
                     self.flow.fill(0.0);
                 }
             }

@@ -1,5 +1,6 @@
 //! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
 
+use super::breaks::Breaks;
 use super::budget::{self, Account};
 use super::contact_model::{ContactModel, Overlap};
 use super::control::Control;
@@ -90,6 +91,7 @@ pub struct Model {
     pub(super) motors: Vec<Motor>,
     pub(super) clamps: Vec<Clamp>,
     pub(super) prescribed: Vec<bool>,
+    pub(super) breaks: Breaks,
     pub(super) pattern: Pattern,
     pub(super) filaments: Filaments,
     /// Turns residuals into forces: 1 for positions, one over a length for angles.
@@ -156,7 +158,9 @@ impl Model {
         let (part_of_node, mut free_parts) = budget::parts(network.edges(), &held, contact.is_some());
         let turned = network.edges().iter().zip(network.edge_dofs()).filter(|(_, dof)| prescribed[**dof]);
         turned.for_each(|(&[i, _], _)| free_parts[part_of_node[i]] = false);
+        let turning = clamps.iter().filter(|clamp| !clamp.edges.is_empty()).map(|clamp| &clamp.angular_velocity);
         let model = Self {
+            breaks: Breaks::new(&motors, turning),
             point_loads: point_loads(&specification, &network, dof_count),
             weights: weights(&specification, &network, dof_count, &rest.lengths),
             part_of_node,

@@ -5,6 +5,7 @@ use super::model::Model;
 use super::statistics::Statistics;
 use super::targets::Size;
 use crate::linear::LinearError;
+use crate::rod::fault::fault;
 
 /// Where Newton's method stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +36,7 @@ impl Default for NewtonSettings {
 pub(super) struct NewtonFailure {
     pub residual: f64,
     pub iterations: usize,
-    pub worst: usize,
+    pub worst: Option<usize>,
     pub reason: String,
 }
 
@@ -76,7 +77,7 @@ fn failure(size: Option<Size>, iterations: usize, reason: &str) -> NewtonFailure
     NewtonFailure {
         residual: size.map_or(f64::NAN, |size| size.norm),
         iterations,
-        worst: size.map_or(0, |size| size.worst),
+        worst: size.map(|size| size.worst),
         reason: reason.to_owned(),
     }
 }
@@ -94,7 +95,12 @@ struct Newton<'a, 'b> {
 impl Newton<'_, '_> {
     fn evaluate_start(&mut self) -> Result<Size, NewtonFailure> {
         let size = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
-        size.ok_or_else(|| failure(None, 0, "the guess is not a configuration"))
+        size.ok_or_else(|| {
+            let fault = fault(&self.model.network, &self.unknowns.q);
+            let reason = fault.as_ref().map_or("forces are too large to be numbers", |fault| fault.what);
+            let worst = fault.map(|fault| self.model.network.node_dofs()[fault.node]);
+            NewtonFailure { worst, ..failure(None, 0, reason) }
+        })
     }
 
     /// An error if the caller wants to stop.
@@ -184,6 +190,7 @@ impl Newton<'_, '_> {
             self.linearize().map_err(broken)?;
             let correction = self.correction().map_err(broken)?;
             if correction <= tolerance {
+                self.polish();
                 return Ok(());
             }
             let linear = (LINEAR_SHARE * tolerance / correction).clamp(LINEAR_TOLERANCE, LOOSEST_CORRECTION);
@@ -209,10 +216,28 @@ impl Newton<'_, '_> {
             self.accept();
             size = trial;
             if left <= tolerance {
+                self.polish();
                 return Ok(());
             }
         }
         Err(failure(Some(size), max_iterations, "too many iterations"))
+    }
+
+    /// Makes the correction that was measured last, which is small enough to be left: it is at hand, and with it the forces
+    /// balance far better. Strains that no one can see are tensions and torques that everyone can read.
+    fn polish(&mut self) {
+        let Self { balance, model, step, work, unknowns, .. } = self;
+        if balance.last_correction(model, step, &unknowns.tensions, &mut work.direction).is_err() {
+            return;
+        }
+        work.try_length(unknowns, 1.0);
+        let free = balance.step_limit(model, &unknowns.q, &work.trial.q, self.statistics) >= 1.0;
+        if free && balance.place(model, step, &work.trial.q) {
+            std::mem::swap(*unknowns, &mut work.trial);
+        } else {
+            // The configuration goes back to what is kept.
+            balance.place(model, step, &unknowns.q);
+        }
     }
 }
 

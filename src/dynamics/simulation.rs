@@ -5,8 +5,9 @@ use std::time::Instant;
 use super::balance::{Balance, Step, Unknowns};
 use super::budget::Accepted;
 use super::contact_model::ContactModel;
-use super::control::Control;
+use super::control::{Control, Estimate};
 use super::failure::{StepError, TryError};
+use super::inputs::Inputs;
 use super::interrupt::Hook;
 use super::model::{Model, ModelError};
 use super::newton::{self, Goal, NewtonSettings, NewtonWork};
@@ -18,7 +19,6 @@ use super::statistics::Statistics;
 use super::threads::Threads;
 use crate::Vec3;
 use crate::contact::spillmann::ContactSolver;
-use crate::elastic::motors::Drive;
 
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
@@ -37,7 +37,7 @@ pub struct Simulation {
     pub(super) scheme: Scheme,
     pub(super) dt: f64,
     pub(super) settings: NewtonSettings,
-    work: NewtonWork,
+    pub(super) work: NewtonWork,
     contact: Option<ContactSolver>,
     pub(super) statistics: Statistics,
     fluid_step: Option<u64>,
@@ -220,20 +220,24 @@ impl Simulation {
         dt: f64,
         residual: f64,
         iterations: usize,
-        worst: usize,
+        worst: Option<usize>,
         reason: String,
     ) -> StepError {
         let smallest_gap = self.smallest_gap().unwrap_or(f64::INFINITY);
         let dofs = self.model.network.node_dofs();
+        let advice = match self.tolerance {
+            None => "a smaller dt, or rtol in its place, may help",
+            Some(_) => "a finer mesh there, a slower drive or a smaller rtol may help",
+        };
         StepError::Convergence {
             time: self.state.time,
             step: self.state.steps,
             dt,
-            residual,
+            residual: Some(residual).filter(|residual| residual.is_finite()),
             iterations,
             smallest_gap,
-            worst_node: dofs.partition_point(|&dof| dof <= worst).saturating_sub(1),
-            reason,
+            worst_node: worst.map(|worst| dofs.partition_point(|&dof| dof <= worst).saturating_sub(1)),
+            reason: format!("{reason}; {advice}"),
         }
     }
 
@@ -245,12 +249,15 @@ impl Simulation {
         let mut trial = std::mem::take(&mut self.trial);
         self.open_account();
         let prepared = self.prepare(&mut trial, t0, t1);
-        let solved = prepared.and_then(|motors| self.solve(motors, dt, order, &mut trial));
+        let solved = prepared.and_then(|Inputs { angles, torques, departure, impulses, .. }| {
+            let angles = self.solve((angles, torques), dt, order, &mut trial)?;
+            Ok((angles, departure, impulses))
+        });
         self.trial = trial;
         if self.balance.interrupt.stopped() {
             return Err(self.interrupted());
         }
-        let angles = solved?;
+        let (angles, departure, impulses) = solved?;
         let missed = self.state.history.prediction_errors(
             (t0, &self.state.q),
             (t1, &self.trial.q),
@@ -260,8 +267,14 @@ impl Simulation {
         let mut accepted = true;
         if let Some(tolerance) = self.tolerance {
             let times = self.state.history.times(t0, usize::MAX);
-            let control = Control { dt, order };
-            (self.state.control, accepted) = control.judge(&times, t1, &missed, tolerance);
+            let control = Control { order, ..self.state.control };
+            let mut unseen = departure / self.angle_tolerance() * tolerance;
+            for (dof, impulse) in impulses {
+                unseen = unseen.max(self.balance.response(&self.model, dof)? * impulse / dt);
+            }
+            let highest_order = self.scheme.highest_order();
+            let estimate = Estimate { missed: &missed, unseen, tolerance, highest_order };
+            (self.state.control, accepted) = control.judge(&times, t1, &estimate);
         }
         if accepted {
             self.accept(angles, dt, order, &missed);
@@ -280,32 +293,22 @@ impl Simulation {
         self.balance.interrupt.set(hook);
     }
 
-    /// Motor angles and torques at the end of the step; the guess, with the prescribed degrees of freedom set.
-    fn prepare(&self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<(Vec<f64>, Vec<f64>), TryError> {
-        let mut angles = self.state.motor_angles.clone();
-        let mut torques = vec![0.0; angles.len()];
-        for (k, motor) in self.model.motors.iter().enumerate() {
-            match &motor.drive {
-                Drive::Speed(signal) => angles[k] += signal.integral(t0, t1)?,
-                Drive::Torque { signal, .. } => torques[k] = signal.value(t1)?,
-            }
-        }
+    /// What motors and clamps do over the step; the guess, with the prescribed degrees of freedom set.
+    fn prepare(&self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<Inputs, TryError> {
+        let inputs = Inputs::new(&self.model, &self.state.motor_angles, (t0, t1))?;
         let state = &self.state;
         let order = state.history.guess_order();
         state.history.extrapolate(order, (t0, &state.q), |sample| &sample.q, t1, &mut guess.q);
         state.history.extrapolate(order, (t0, &state.density), |sample| &sample.density, t1, &mut guess.density);
         guess.tensions.copy_from_slice(&state.tensions);
         let target = &mut guess.q;
-        for clamp in &self.model.clamps {
+        for (clamp, turn) in self.model.clamps.iter().zip(&inputs.turns) {
             for &dof in &clamp.nodes {
                 (0..3).for_each(|c| target[dof + c] = state.q[dof + c] + (t1 - t0) * clamp.velocity[c]);
             }
-            if !clamp.edges.is_empty() {
-                let turn = clamp.angular_velocity.integral(t0, t1)?;
-                clamp.edges.iter().for_each(|&dof| target[dof] = state.q[dof] + turn);
-            }
+            clamp.edges.iter().for_each(|&dof| target[dof] = state.q[dof] + turn);
         }
-        Ok((angles, torques))
+        Ok(inputs)
     }
 
     /// Solves the step from the guess, contact included; the motor angles at its end.
@@ -395,7 +398,7 @@ impl Simulation {
         Err(TryError::Solve {
             residual: f64::NAN,
             iterations: law.max_iterations(),
-            worst: 0,
+            worst: None,
             reason: format!("contact left an overlap of {violation:.2e} of the sum of radii"),
         })
     }
@@ -471,7 +474,7 @@ fn keep_apart(
     let prescribed = model.prescribed.iter().zip(start.iter_mut().zip(&*guess));
     prescribed.filter(|(held, _)| **held).for_each(|(_, (start, end))| *start = *end);
     let blocked =
-        |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: 0, reason: reason.to_owned() };
+        |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: None, reason: reason.to_owned() };
     if balance.step_limit(model, from, &start, statistics) < 1.0 {
         return Err(blocked("what is prescribed moves filaments into each other"));
     }

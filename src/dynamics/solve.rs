@@ -132,6 +132,43 @@ impl Balance {
         solved.map(|()| largest)
     }
 
+    /// The correction that [`Self::correction`] has measured, as a direction from the given tensions of edges.
+    pub fn last_correction(
+        &mut self,
+        model: &Model,
+        step: &Step,
+        tensions: &[f64],
+        out: &mut Unknowns,
+    ) -> Result<(), LinearError> {
+        out.q.copy_from_slice(&self.work.moved);
+        model.stretching.tension_changes(&self.configuration, &out.q, tensions, &mut out.tensions);
+        let Self { system, fluid, fluid_dofs, work, .. } = self;
+        let Some(fluid) = implicit_nonlocal(fluid, step) else { return Ok(()) };
+        let mut pair = FluidSystem {
+            model,
+            rate: step.rate,
+            sparse: system,
+            fluid,
+            fluid_dofs,
+            rhs: None,
+            moved: &mut work.moved,
+            density: &mut out.density,
+            pool: None,
+            roughly: true,
+        };
+        pair.complete(&work.seek)
+    }
+
+    /// Largest displacement, m, that a unit of force on one degree of freedom makes within the step, with the factors of the
+    /// last linearisation.
+    pub fn response(&mut self, model: &Model, dof: usize) -> Result<f64, LinearError> {
+        let Work { rhs, moved, .. } = &mut self.work;
+        rhs.fill(0.0);
+        rhs[dof] = 1.0;
+        self.system.solve_roughly(rhs, moved)?;
+        Ok(moved.iter().zip(&model.force_weight).map(|(moved, weight)| moved.abs() / weight).fold(0.0, f64::max))
+    }
+
     fn solve(
         &mut self,
         model: &Model,

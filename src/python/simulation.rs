@@ -221,6 +221,7 @@ impl Simulation {
     /// Everything a saved frame holds but the time, as a mapping of arrays.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let frame = PyDict::new(py);
+        let speeds = self.inner.motor_speeds().map_err(|error| step_error(py, StepError::Signal(error)))?;
         let density = self.inner.force_density().map_err(|error| linear_error(py, &error))?;
         frame.set_item("time", self.inner.state().time)?;
         frame.set_item("nodes", self.nodes(py)?)?;
@@ -228,7 +229,7 @@ impl Simulation {
         frame.set_item("velocities", self.velocities(py)?)?;
         frame.set_item("force_density", from_flat(py, density, 3)?)?;
         frame.set_item("motor_angle", PyArray1::from_slice(py, &self.inner.state().motor_angles))?;
-        frame.set_item("motor_speed", PyArray1::from_vec(py, self.inner.motor_speeds()))?;
+        frame.set_item("motor_speed", PyArray1::from_vec(py, speeds))?;
         frame.set_item("motor_torque", PyArray1::from_vec(py, self.inner.motor_torques()))?;
         frame.set_item("minimum_gap", self.inner.smallest_gap().unwrap_or(f64::INFINITY))?;
         frame.set_item("contacts", self.inner.state().contacts.len())?;
@@ -275,7 +276,7 @@ impl Simulation {
         };
         out.set_item("density", PyArray1::from_slice(py, &state.density))?;
         out.set_item("tensions", PyArray1::from_slice(py, &state.tensions))?;
-        out.set_item("control_step", PyArray1::from_slice(py, &[state.control.dt]))?;
+        out.set_item("control_step", PyArray1::from_slice(py, &control_numbers(&state.control)))?;
         out.set_item("control_order", PyArray1::from_slice(py, &[state.control.order as u64]))?;
         out.set_item("history_times", PyArray1::from_iter(py, past.iter().map(|sample| sample.time)))?;
         out.set_item("history_states", rows(|sample| &sample.q, state.q.len())?)?;
@@ -295,14 +296,10 @@ impl Simulation {
 
     /// Takes over a state saved by `state()` of a simulation of the same scene.
     fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
-<<<<<<< HEAD
         saved.check_shapes(py, self.inner.model().dof_count())?;
         let flow = self.inner.state().density.len();
-=======
-        let current = self.inner.state();
-        let flow = current.density.len();
-        let account = Account::from_numbers(&values(&saved.account));
->>>>>>> guards
+        let account = Account::from_numbers(&values(&saved.account))
+            .ok_or_else(|| scene_error(py, "state", "an account of another length", "what state() returned"))?;
         let mut state = State {
             time: first(&saved.time),
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
@@ -310,7 +307,7 @@ impl Simulation {
             velocity: values(&saved.velocity),
             density: values(&saved.density),
             tensions: values(&saved.tensions),
-            control: Control { dt: first(&saved.control_step), order: whole(&saved.control_order) },
+            control: control(&saved),
             history: History { past: past(&saved), order: whole(&saved.history_order) },
             frames: ReferenceFrames {
                 tangents: points(py, "tangents", &saved.tangents)?,
@@ -318,12 +315,8 @@ impl Simulation {
                 twists: values(&saved.twists),
             },
             motor_angles: values(&saved.motor_angles),
-<<<<<<< HEAD
             contacts: contacts(py, &saved)?,
-=======
-            contacts: contacts(&saved),
-            account: account.unwrap_or_default(),
->>>>>>> guards
+            account,
             contact_anchor: points(py, "contact_anchor", &saved.contact_anchor)?,
         };
         // Schemes without a force density of their own save an empty one; the next step finds it.
@@ -332,42 +325,6 @@ impl Simulation {
             state.density = vec![0.0; flow];
             state.history.past.iter_mut().for_each(|sample| sample.density = vec![0.0; flow]);
         }
-<<<<<<< HEAD
-=======
-        let same = account.is_some()
-            && state.q.len() == current.q.len()
-            && state.velocity.len() == current.velocity.len()
-            && state.frames.tangents.len() == current.frames.tangents.len()
-            && state.frames.directors.len() == current.frames.directors.len()
-            && state.frames.twists.len() == current.frames.twists.len()
-            && state.motor_angles.len() == current.motor_angles.len()
-            && state.density.len() == flow
-            && state.tensions.len() == current.tensions.len()
-            && [0, self.inner.model().network().node_count()].contains(&state.contact_anchor.len())
-            && saved.history_states.shape() == [state.history.past.len(), current.q.len()]
-            && saved.history_velocities.shape() == [state.history.past.len(), current.q.len()]
-            && saved.history_densities.shape() == [state.history.past.len(), kept];
-        let bodies = self.inner.model().body_count();
-        let pairs = saved.contact_pairs.as_array();
-        let known = pairs.ncols() == 2
-            && pairs.nrows() == saved.contact_forces.as_array().len()
-            && pairs.iter().all(|&body| usize::try_from(body).is_ok_and(|body| body < bodies));
-        let past = state.history.past.iter();
-        let present = [&state.q, &state.velocity, &state.density, &state.tensions];
-        let finite = present
-            .into_iter()
-            .chain([&state.frames.twists, &state.motor_angles])
-            .chain(past.flat_map(|sample| [&sample.q, &sample.velocity, &sample.density]))
-            .flatten()
-            .chain(state.contacts.iter().map(|(_, force)| force))
-            .chain(state.contact_anchor.iter().flatten())
-            .chain(state.history.past.iter().map(|sample| &sample.time))
-            .chain([&state.time, &state.control.dt])
-            .all(|value| value.is_finite());
-        if !(same && known && finite) {
-            return Err(scene_error(py, "state", "the saved state", "a finite state of the same scene"));
-        }
->>>>>>> guards
         self.inner.adopt(state).map_err(|error| model_error(py, &error))
     }
 }
@@ -430,6 +387,22 @@ fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
 
 fn whole(array: &PyReadonlyArray1<'_, u64>) -> usize {
     array.as_array().first().map_or(0, |&value| value as usize)
+}
+
+/// What [`control`] reads, but for the order.
+fn control_numbers(control: &Control) -> [f64; 3] {
+    [control.dt, control.ceiling, f64::from(u8::from(control.at_jump))]
+}
+
+/// Size and order of the next step; files of before there was a ceiling have none.
+fn control(saved: &StateInput<'_>) -> Control {
+    let number = |k: usize| saved.control_step.as_array().get(k).copied();
+    Control {
+        dt: first(&saved.control_step),
+        order: whole(&saved.control_order),
+        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).unwrap_or(f64::INFINITY),
+        at_jump: number(2).is_some_and(|flag| flag != 0.0),
+    }
 }
 
 fn past(saved: &StateInput<'_>) -> Vec<Sample> {
