@@ -38,8 +38,9 @@ impl Simulation {
 
     /// What the tolerance lets prescribed angles miss within a step, rad.
     pub(super) fn angle_tolerance(&self) -> f64 {
-        let weight = self.model.force_weight.iter().fold(0.0, |largest: f64, weight| largest.max(*weight));
-        self.tolerance.map_or(f64::INFINITY, |length| length * weight)
+        let angles = self.model.network.edge_dofs().iter().map(|&dof| self.model.error_weight[dof]);
+        let weight = angles.fold(0.0, f64::max);
+        self.tolerance.filter(|_| weight > 0.0).map_or(f64::INFINITY, |error| error / weight)
     }
 
     /// Makes one adaptive step, not beyond `limit`; at the start, and after a corner of what drives the scene, two.
@@ -159,6 +160,7 @@ impl Simulation {
                 }
                 self.state.history = History::default();
             }
+            Err(TryError::Interrupted) => return Err(StepError::Interrupted),
             Err(TryError::Signal(error)) => return Err(StepError::Signal(error)),
             Ok(false) | Err(TryError::Solve { .. }) => self.restore(before.clone()),
         }
@@ -182,6 +184,7 @@ impl Simulation {
                 Err(self.convergence_error(dt, f64::NAN, 0, None, reason))
             }
             Ok(()) => Ok(()),
+            Err(TryError::Interrupted) => Err(StepError::Interrupted),
             Err(TryError::Signal(error)) => Err(StepError::Signal(error)),
             Err(TryError::Solve { residual, iterations, worst, reason }) => {
                 self.state.control = self.state.control.failed(dt);

@@ -142,7 +142,7 @@ impl Balance {
     ) -> Result<(), LinearError> {
         out.q.copy_from_slice(&self.work.moved);
         model.stretching.tension_changes(&self.configuration, &out.q, tensions, &mut out.tensions);
-        let Self { system, fluid, fluid_dofs, work, .. } = self;
+        let Self { system, fluid, fluid_dofs, work, targets, interrupt, .. } = self;
         let Some(fluid) = implicit_nonlocal(fluid, step) else { return Ok(()) };
         let mut pair = FluidSystem {
             model,
@@ -154,19 +154,22 @@ impl Balance {
             moved: &mut work.moved,
             density: &mut out.density,
             pool: None,
+            interrupt,
             roughly: true,
+            weights: &targets.slip_weight,
+            unweighted: &mut work.unweighted,
         };
         pair.complete(&work.seek)
     }
 
-    /// Largest displacement, m, that a unit of force on one degree of freedom makes within the step, with the factors of the
-    /// last linearisation.
+    /// Largest displacement, relative to the size of a filament, that a unit of force on one degree of freedom makes within the
+    /// step, with the factors of the last linearisation.
     pub fn response(&mut self, model: &Model, dof: usize) -> Result<f64, LinearError> {
         let Work { rhs, moved, .. } = &mut self.work;
         rhs.fill(0.0);
         rhs[dof] = 1.0;
         self.system.solve_roughly(rhs, moved)?;
-        Ok(moved.iter().zip(&model.force_weight).map(|(moved, weight)| moved.abs() / weight).fold(0.0, f64::max))
+        Ok(moved.iter().zip(&model.error_weight).map(|(moved, weight)| moved.abs() * weight).fold(0.0, f64::max))
     }
 
     fn solve(
