@@ -99,7 +99,7 @@ def test_steps_far_too_long_for_what_happens_warn_of_lost_energy():
 
 @pytest.mark.parametrize("stored, warned", [(0.4, False), (0.6, True)])
 def test_energy_from_nowhere_is_warned_of(stored: float, warned: bool):
-    # One joule given by the motors, half a joule taken by the fluid: what is stored beyond that is from nowhere.
+    # Motors give one joule, the fluid takes half of it: what is stored beyond the other half is from nowhere.
     account = np.zeros(42)
     account[1], account[5], account[19], account[23], account[24] = 1.0, 0.5, stored, 1.0, stored
     found = [notice.kind for notice in notices(account, flagrs.scenarios.robot())]
