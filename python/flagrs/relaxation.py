@@ -256,7 +256,7 @@ class Network:
         try:
             eigenvalue = _slowest(stiffness, resistance, least)
         except (np.linalg.LinAlgError, scipy.sparse.linalg.ArpackError, RuntimeError):
-            # Stiffnesses too far apart for eigenvalues to be found: a clamped beam as soft as the softest part.
+            # Stiffnesses too far apart to find eigenvalues: a clamped beam as soft as the softest part.
             eigenvalue = CLAMPED_ROOT**4 * least / ELASTIC_SHARE
         if eigenvalue is None:
             return None
