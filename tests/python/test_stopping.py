@@ -244,6 +244,13 @@ def test_copies_go_their_own_way_to_the_same_bits() -> None:
         pickle.dumps(simulation)
 
 
+def test_scenes_that_were_pickled_or_copied_stay_as_they_are() -> None:
+    for scene in (pickle.loads(pickle.dumps(ROBOT)), copy.deepcopy(ROBOT), copy.copy(ROBOT)):
+        assert scene == ROBOT
+        with pytest.raises(ValueError, match="read-only"):
+            scene.rods[0].nodes[0, 0] = 7.0
+
+
 BAD_STATES: dict[str, Any] = {
     "control_order": np.array([0], dtype=np.uint64),
     "history_order": np.array([9], dtype=np.uint64),
