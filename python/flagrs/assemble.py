@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from flagrs.contact_scales import barrier_stiffness, slip_velocity
 from flagrs.errors import SceneError, not_allowed
 from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Scene, Table, rod_topology
-from flagrs.scene.signal import Signal
+from flagrs.scene.signal import Signal, signal_value
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
 
 #: Excluded rest arc length over the sum of radii where a contact gives none; see docs/theory/contact.md.
@@ -81,7 +82,7 @@ def _directors(scene: Scene) -> list[tuple[int, list[float]]]:
 def _signal(signal: Signal) -> float | tuple[FloatArray, FloatArray] | Callable[[float], float]:
     if isinstance(signal, Table):
         return np.array(signal.times), np.array(signal.values)
-    return signal
+    return partial(signal_value, signal) if callable(signal) else signal
 
 
 def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:

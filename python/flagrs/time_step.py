@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagrs.scene import Rod, Scene
+from flagrs.errors import SceneError
+from flagrs.scene import Rod, Scene, signal_value
 from flagrs.scene.signal import Signal, Table
 from flagrs.scene.values import FloatArray
 
@@ -43,11 +44,20 @@ def fastest_rate(scene: Scene) -> float:
     return max((_largest(signal) for signal in signals), default=0.0)
 
 
+def _sample(signal: Signal, time: float) -> float:
+    """Return a signal's value [rad/s]; 0 where it has none, which the run may never reach."""
+    try:
+        return signal_value(signal, time)
+    except SceneError:
+        return 0.0
+
+
 def _largest(signal: Signal) -> float:
     if isinstance(signal, Table):
         return float(np.abs(signal.values).max())
     if callable(signal):
-        return max(abs(float(signal(time))) for time in np.linspace(0.0, 10.0, 101))
+        sampled = [_sample(signal, float(time)) for time in np.linspace(0.0, 10.0, 101)]
+        return max(map(abs, sampled), default=0.0)
     return abs(float(signal))
 
 
