@@ -2,6 +2,7 @@
 
 from flagrs import contact, fluid, scenarios
 from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError
+from flagrs.guards import EnergyWarning, FlagrsWarning, MeshWarning, ReynoldsWarning, StrainWarning
 from flagrs.scene import (
     Clamp,
     Contact,
@@ -13,6 +14,7 @@ from flagrs.scene import (
     Rod,
     Scene,
     Table,
+    TimeFunction,
 )
 from flagrs.simulation import Simulation
 from flagrs.suggest import Suggestion, suggest
@@ -26,19 +28,25 @@ __all__ = [
     "Clamp",
     "Contact",
     "ConvergenceError",
+    "EnergyWarning",
     "FileError",
     "FlagrsError",
+    "FlagrsWarning",
     "Fluid",
     "Head",
     "Material",
+    "MeshWarning",
     "Motor",
     "PointLoad",
+    "ReynoldsWarning",
     "Rod",
     "Scene",
     "SceneError",
     "Simulation",
+    "StrainWarning",
     "Suggestion",
     "Table",
+    "TimeFunction",
     "Trajectory",
     "__version__",
     "contact",

@@ -14,10 +14,14 @@ import scipy.sparse
 
 from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
+from flagrs.budget import statistics_of
+from flagrs.default_step import default_step
 from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
+from flagrs.flow import flow_of, immersed_edges
 from flagrs.frame_times import check_frames, frame_times
+from flagrs.guards import Guards, Notice
 from flagrs.memory import require_memory
 from flagrs.progress import bar_for
 from flagrs.recorder import Recorder, load_checkpoint
@@ -29,9 +33,7 @@ from flagrs.threads import thread_count
 from flagrs.time_step import (
     LOCAL_SHARE,
     STABLE_SHARE,
-    default_step,
     explicit_limit,
-    size,
 )
 from flagrs.trajectory import Trajectory
 
@@ -60,12 +62,13 @@ class Simulation:
         the same with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
-        Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit
-        for the explicit scheme.
+        Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
+        motor or less where filaments relax faster; a fifth of the stability limit for the explicit scheme.
     rtol
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
-        of node positions, relative to the size of the filaments (`flagrs.time_step.size`). None: steps of
-        `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
+        of node positions, relative to the size of the filament they are on (docs/theory/time.md). None:
+        steps of `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first
+        step.
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all. Results do not depend on it.
 
@@ -113,9 +116,10 @@ class Simulation:
         self._exclusive = Exclusive(native, "the simulation")
         self._native = cast(_flagrs.Simulation, self._exclusive)
         self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
+        self._guards = Guards(scene)
         self._restored: Path | None = None
         if rtol is not None:
-            self._native.set_tolerance(LOCAL_SHARE * rtol * size(scene))
+            self._native.set_tolerance(LOCAL_SHARE * rtol)
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
 
@@ -179,6 +183,29 @@ class Simulation:
         return edges_of(self._scene)
 
     @property
+    def immersed_edges(self) -> IntArray:
+        """Start and end node (W, 2) of the edges in the fluid: those that go with a force density."""
+        return immersed_edges(self._scene)[0]
+
+    def flow(self, points: Any) -> FloatArray:
+        """Return the velocity (M, 3) of the fluid at points (M, 3) [m], driven by the immersed edges [m/s].
+
+        Raises
+        ------
+        FlagrsError
+            If the fluid is not of regularized Stokeslet segments.
+        SceneError
+            For points of the wrong shape.
+        """
+        threads = self._settings["threads"]
+        return flow_of(self._scene, self.nodes, self.frame()["force_density"], points, threads)
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What has been warned of so far, with the worst value of each kind."""
+        return self._guards.found
+
+    @property
     def theta(self) -> FloatArray:
         """Angles (E,) of the material frames against the reference frames [rad]; a copy."""
         return self._native.theta
@@ -210,8 +237,15 @@ class Simulation:
 
     @property
     def statistics(self) -> dict[str, float]:
-        """Counts of steps, rejected steps, Newton, Krylov and contact iterations, and seconds by part."""
-        return self._native.statistics()
+        """Counts of steps, rejected steps, Newton, Krylov and contact iterations, seconds, and balances.
+
+        ``energy_given``, ``energy_taken`` and ``energy_stored`` [J] are sums since the start,
+        ``energy_defect`` what is left of them over the energy that has passed; ``force_imbalance`` and
+        ``torque_imbalance`` are the largest outer force and torque left over on a free part, relative to the
+        sums of their sizes; ``warnings`` is how many kinds there were.
+        """
+        numbers = statistics_of(self._native.account())
+        return self._native.statistics() | numbers | {"warnings": len(self._guards.found)}
 
     def step(self, n: int = 1) -> None:
         """Make n steps of `dt`.
@@ -227,6 +261,7 @@ class Simulation:
             If n is not a whole number, at least 0, or a motor's function gives anything but a finite number.
         """
         self._native.step(min(whole("n", n, least=0), MOST_STEPS))
+        self._guards.look(self._native.account())
 
     def run(
         self,
@@ -290,11 +325,13 @@ class Simulation:
             start = recorder.last_time if again else self.time
             for time in frame_times(start, end, every):
                 recorder.append(self._frame_at(time, end))
+                self._guards.look(self._native.account())
                 if recorder.frame_count % CHECKPOINT_FRAMES == 0:
                     recorder.checkpoint(self.state())
                 if progress is not None:
                     progress(time)
             recorder.checkpoint(self.state())
+            self._guards.look(self._native.account(), end=True)
         return recorder.trajectory()
 
     def _path(self, path: str | Path | Literal[False] | None) -> Path | None:

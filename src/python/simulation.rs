@@ -9,13 +9,14 @@ use pyo3::types::PyDict;
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
+use crate::dynamics::budget::Account;
 use crate::dynamics::control::Control;
 use crate::dynamics::failure::StepError;
 use crate::dynamics::predictor::{History, Sample};
 use crate::dynamics::scheme::Scheme;
 use crate::dynamics::simulation as core;
 use crate::dynamics::state::State;
-use crate::rod::configuration::ReferenceFrames;
+use crate::rod::reference::ReferenceFrames;
 
 /// A running simulation; the class `flagrs.Simulation` wraps it.
 #[pyclass(module = "flagrs._flagrs")]
@@ -56,7 +57,7 @@ impl Simulation {
         interruptible(py, &mut self.inner, |inner| (0..count).try_for_each(|_| inner.step()))
     }
 
-    /// Local error (m) that adaptive steps keep to; fixed steps without.
+    /// Local error, relative to the size of each filament, that adaptive steps keep to; fixed steps without.
     #[pyo3(signature = (tolerance=None))]
     fn set_tolerance(&mut self, tolerance: Option<f64>) {
         self.inner.set_tolerance(tolerance);
@@ -220,6 +221,7 @@ impl Simulation {
     /// Everything a saved frame holds but the time, as a mapping of arrays.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let frame = PyDict::new(py);
+        let speeds = self.inner.motor_speeds().map_err(|error| step_error(py, StepError::Signal(error)))?;
         let density = self.inner.force_density().map_err(|error| linear_error(py, &error))?;
         frame.set_item("time", self.inner.state().time)?;
         frame.set_item("nodes", self.nodes(py)?)?;
@@ -227,12 +229,18 @@ impl Simulation {
         frame.set_item("velocities", self.velocities(py)?)?;
         frame.set_item("force_density", from_flat(py, density, 3)?)?;
         frame.set_item("motor_angle", PyArray1::from_slice(py, &self.inner.state().motor_angles))?;
-        frame.set_item("motor_speed", PyArray1::from_vec(py, self.inner.motor_speeds()))?;
+        frame.set_item("motor_speed", PyArray1::from_vec(py, speeds))?;
         frame.set_item("motor_torque", PyArray1::from_vec(py, self.inner.motor_torques()))?;
         frame.set_item("minimum_gap", self.inner.smallest_gap().unwrap_or(f64::INFINITY))?;
         frame.set_item("contacts", self.inner.state().contacts.len())?;
+        frame.set_item("account", self.account(py))?;
         frame.set_item("energy", PyArray1::from_slice(py, &self.inner.energies()))?;
         Ok(frame)
+    }
+
+    /// Energies, balances and extremes so far, as `flagrs.budget` reads them.
+    fn account<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.state().account.numbers())
     }
 
     /// Counts and times since the start.
@@ -268,7 +276,7 @@ impl Simulation {
         };
         out.set_item("density", PyArray1::from_slice(py, &state.density))?;
         out.set_item("tensions", PyArray1::from_slice(py, &state.tensions))?;
-        out.set_item("control_step", PyArray1::from_slice(py, &[state.control.dt]))?;
+        out.set_item("control_step", PyArray1::from_slice(py, &control_numbers(&state.control)))?;
         out.set_item("control_order", PyArray1::from_slice(py, &[state.control.order as u64]))?;
         out.set_item("history_times", PyArray1::from_iter(py, past.iter().map(|sample| sample.time)))?;
         out.set_item("history_states", rows(|sample| &sample.q, state.q.len())?)?;
@@ -281,6 +289,7 @@ impl Simulation {
         out.set_item("motor_angles", PyArray1::from_slice(py, &state.motor_angles))?;
         out.set_item("contact_pairs", PyArray1::from_iter(py, pairs).reshape([state.contacts.len(), 2])?)?;
         out.set_item("contact_anchor", from_points(py, &state.contact_anchor)?)?;
+        out.set_item("account", PyArray1::from_slice(py, &state.account.numbers()))?;
         out.set_item("contact_forces", PyArray1::from_iter(py, state.contacts.iter().map(|(_, force)| *force)))?;
         Ok(out)
     }
@@ -289,6 +298,8 @@ impl Simulation {
     fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
         saved.check_shapes(py, self.inner.model().dof_count())?;
         let flow = self.inner.state().density.len();
+        let account = Account::from_numbers(&values(&saved.account))
+            .ok_or_else(|| scene_error(py, "state", "an account of another length", "what state() returned"))?;
         let mut state = State {
             time: first(&saved.time),
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
@@ -296,7 +307,7 @@ impl Simulation {
             velocity: values(&saved.velocity),
             density: values(&saved.density),
             tensions: values(&saved.tensions),
-            control: Control { dt: first(&saved.control_step), order: whole(&saved.control_order) },
+            control: control(&saved),
             history: History { past: past(&saved), order: whole(&saved.history_order) },
             frames: ReferenceFrames {
                 tangents: points(py, "tangents", &saved.tangents)?,
@@ -305,6 +316,7 @@ impl Simulation {
             },
             motor_angles: values(&saved.motor_angles),
             contacts: contacts(py, &saved)?,
+            account,
             contact_anchor: points(py, "contact_anchor", &saved.contact_anchor)?,
         };
         // Schemes without a force density of their own save an empty one; the next step finds it.
@@ -366,6 +378,7 @@ struct StateInput<'py> {
     contact_pairs: PyReadonlyArray2<'py, i64>,
     contact_forces: PyReadonlyArray1<'py, f64>,
     contact_anchor: PyReadonlyArray2<'py, f64>,
+    account: PyReadonlyArray1<'py, f64>,
 }
 
 fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
@@ -374,6 +387,22 @@ fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
 
 fn whole(array: &PyReadonlyArray1<'_, u64>) -> usize {
     array.as_array().first().map_or(0, |&value| value as usize)
+}
+
+/// What [`control`] reads, but for the order.
+fn control_numbers(control: &Control) -> [f64; 3] {
+    [control.dt, control.ceiling, f64::from(u8::from(control.at_jump))]
+}
+
+/// Size and order of the next step; files of before there was a ceiling have none.
+fn control(saved: &StateInput<'_>) -> Control {
+    let number = |k: usize| saved.control_step.as_array().get(k).copied();
+    Control {
+        dt: first(&saved.control_step),
+        order: whole(&saved.control_order),
+        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).unwrap_or(f64::INFINITY),
+        at_jump: number(2).is_some_and(|flag| flag != 0.0),
+    }
 }
 
 fn past(saved: &StateInput<'_>) -> Vec<Sample> {

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagrs.memory import in_words
+from flagrs.scene.plausibility import Scales, implausible, scales_of
 from flagrs.scene.values import FloatArray
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ class Plan:
         Rows of the dense fluid matrix; 0 without one.
     far_field_error : float or None
         Relative error of fluid products made without a matrix; None where there are none.
+    scales : Scales
+        Extent, slenderness, Reynolds and sperm number.
     flops : float
         Estimated floating-point operations of a step, to a factor of two or three.
     warnings : tuple of str
@@ -63,6 +66,7 @@ class Plan:
     left_out: tuple[str, ...]
     fluid_matrix: int
     far_field_error: float | None
+    scales: Scales
     flops: float
     warnings: tuple[str, ...]
 
@@ -100,6 +104,7 @@ class Plan:
             lines.append(
                 f"fluid:    products to {self.far_field_error:g} by fast multipoles, without a matrix"
             )
+        lines.append(f"scales:   {self.scales}")
         lines.append(f"memory:   about {in_words(self.memory)}")
         lines.append(f"a step:   about {self.flops / 1e6:.3g} million floating-point operations")
         return "\n".join([*lines, *(f"warning:  {warning}" for warning in self.warnings)])
@@ -113,6 +118,7 @@ def plan_of(scene: Scene) -> Plan:
     fast = scene.fluid is not None and fluid_model == "RSS" and immersed >= scene.fluid.crossover
     dense = 3 * immersed if fluid_model == "RSS" and not fast else 0
     present, absent = _terms(scene)
+    scales = scales_of(scene)
     return Plan(
         nodes=scene.node_count,
         edges=scene.edge_count,
@@ -124,7 +130,8 @@ def plan_of(scene: Scene) -> Plan:
         fluid_matrix=dense,
         far_field_error=scene.fluid.far_field_error if scene.fluid is not None and fast else None,
         flops=_flops(scene, dense) + (FAST_FLOPS * immersed if fast else 0.0),
-        warnings=tuple(_warnings(scene)),
+        scales=scales,
+        warnings=(*_warnings(scene), *implausible(scene, scales)),
     )
 
 
@@ -156,7 +163,7 @@ def _terms(scene: Scene) -> tuple[list[str], list[str]]:
         "point loads": f"{len(scene.loads)} point loads" if scene.loads else "",
         "contact": f"contact ({scene.contact.method})" if scene.contact else "",
         "gravity": f"gravity {np.linalg.norm(scene.gravity):g} m/s^2" if heavy else "",
-        "buoyancy": "buoyancy" if heavy and fluid and fluid.density > 0.0 else "",
+        "buoyancy": "buoyancy" if heavy and fluid and fluid.density_for_buoyancy > 0.0 else "",
     }
     elastic = "stretching, bending, twisting" if scene.hinge_count else "stretching"
     return [elastic, *filter(None, words.values())], [term for term, text in words.items() if not text]
@@ -177,10 +184,6 @@ def _warnings(scene: Scene) -> list[str]:
             found += _conditioning(number, ratio[rod.immersed_array()])
     if scene.head is not None and fluid is None:
         found.append("the head feels no drag, because the scene has no fluid")
-    if fluid is not None and fluid.density > 0.0 and not scene.gravity.any():
-        found.append(
-            f"the fluid's density of {fluid.density:g} kg/m^3 is not used, because there is no gravity"
-        )
     return found
 
 
