@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flagrs.errors import SceneError
 from flagrs.scene import Rod, Scene
 from flagrs.scene.signal import Signal, Table, signal_value
 from flagrs.scene.values import FloatArray
@@ -62,11 +63,19 @@ def samples() -> tuple[FloatArray, float]:
     return np.sort(np.concatenate([even, decades])), 1e-6
 
 
+def _sample(signal: Signal, time: float) -> float:
+    """Return a signal's value [rad/s]; 0 where it has none, which the run may never reach."""
+    try:
+        return signal_value(signal, time)
+    except SceneError:
+        return 0.0
+
+
 def _largest(signal: Signal) -> float:
     if isinstance(signal, Table):
         return float(np.abs(signal.values).max())
     if callable(signal):
-        return max(abs(signal_value(signal, float(time))) for time in samples()[0])
+        return max(abs(_sample(signal, float(time))) for time in samples()[0])
     return abs(float(signal))
 
 

@@ -49,8 +49,13 @@ impl Simulation {
     /// As [`Self::step`].
     pub fn adaptive_step(&mut self, limit: f64) -> Result<(), StepError> {
         let start = Instant::now();
+        let before = self.state.clone();
         self.begin_anew_at_a_break();
         let result = if self.state.history.past.is_empty() { self.start(limit) } else { self.go_on(limit) };
+        if matches!(result, Err(StepError::Interrupted)) {
+            // Tries that were rejected have left their mark: what goes on from here must not know of them.
+            self.restore(before);
+        }
         self.statistics.seconds_total += start.elapsed().as_secs_f64();
         result
     }
