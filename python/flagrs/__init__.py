@@ -1,7 +1,7 @@
 """Soft helical filaments swimming at low Reynolds number: discrete elastic rods in Stokes flow."""
 
 from flagrs import contact, fluid, scenarios
-from flagrs.errors import ConvergenceError, FlagrsError, SceneError
+from flagrs.errors import ConvergenceError, FlagrsError, SceneError, StabilityWarning
 from flagrs.scene import (
     Clamp,
     Contact,
@@ -34,6 +34,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
+    "StabilityWarning",
     "Suggestion",
     "Table",
     "TimeFunction",

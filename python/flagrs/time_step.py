@@ -20,6 +20,16 @@ STABLE_SHARE = 0.2
 LOCAL_SHARE = 0.2
 
 
+#: Largest local error of a step, in edges: a larger one turns edges by more than their frames and drag allow.
+EDGE_SHARE = 7e-3
+
+
+def local_tolerance(scene: Scene, rtol: float) -> float:
+    """Return the local error [m] that steps may have: a share of the size, and of an edge at most."""
+    edges = min(float(np.median(rod.rest_lengths())) for rod in scene.rods)
+    return min(LOCAL_SHARE * rtol * size(scene), EDGE_SHARE * edges)
+
+
 def size(scene: Scene) -> float:
     """Return the length that relative errors refer to [m].
 
