@@ -24,6 +24,16 @@ GOLDEN = 0.6180339887498949
 LOCAL_SHARE = 0.2
 
 
+#: Largest local error of a step, in edges: a larger one turns edges by more than their frames and drag allow.
+EDGE_SHARE = 7e-3
+
+
+def local_tolerance(scene: Scene, rtol: float) -> float:
+    """Return the local error that steps may have, relative to each filament's size, and an edge's at most."""
+    edges = min(float(np.median(rod.rest_lengths())) / rod_size(rod) for rod in scene.rods)
+    return min(LOCAL_SHARE * rtol, EDGE_SHARE * edges)
+
+
 def size(scene: Scene) -> float:
     """Return the length that relative errors refer to [m].
 

@@ -125,6 +125,8 @@ impl Simulation {
     /// if it is too large.
     fn start(&mut self, limit: f64) -> Result<(), StepError> {
         self.let_jump(limit)?;
+        let wanted = self.state.control.dt;
+        let mut closing_in = true;
         loop {
             let before = self.state.clone();
             let accepted = self.statistics.steps;
@@ -142,6 +144,12 @@ impl Simulation {
             self.state.control = control;
             self.statistics.steps = accepted;
             self.shrink(both.map(|_| ()), dt, limit)?;
+            if closing_in && self.state.control.dt < INSTANT * self.scale(limit) {
+                // The steps close in on a jump that nothing has told of.
+                closing_in = false;
+                self.let_jump(limit)?;
+                self.state.control.dt = wanted;
+            }
         }
     }
 
