@@ -17,12 +17,12 @@ from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
 from flagrs.budget import statistics_of
 from flagrs.default_step import default_step
-from flagrs.errors import FileError, FlagrsError, SceneError, StabilityWarning, not_allowed
+from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.frame_times import check_frames, frame_times
-from flagrs.guards import Guards, Notice
+from flagrs.guards import Guards, Notice, StabilityWarning
 from flagrs.memory import require_memory
 from flagrs.progress import bar_for
 from flagrs.recorder import Recorder, load_checkpoint
