@@ -40,10 +40,11 @@ def fastest_rate(scene: Scene) -> float:
     """Return the largest prescribed angular speed [rad/s]; 0 if nothing turns as prescribed."""
     signals: list[Signal] = [motor.speed for motor in scene.motors if motor.speed is not None]
     signals += [clamp.angular_velocity for clamp in scene.clamps if clamp.edges]
-    return max((_largest(signal) for signal in signals), default=0.0)
+    return max((largest(signal) for signal in signals), default=0.0)
 
 
-def _largest(signal: Signal) -> float:
+def largest(signal: Signal) -> float:
+    """Return the largest magnitude of a signal, of a function of time over the first ten seconds."""
     if isinstance(signal, Table):
         return float(np.abs(signal.values).max())
     if callable(signal):

@@ -48,6 +48,7 @@ impl Simulation {
         }
         let smallest = SMALLEST_STEP * self.dt;
         loop {
+            self.check_progress()?;
             let wanted = self.state.control;
             let left = limit - self.state.time;
             // Two equal steps to the limit rather than a whole one and a sliver.

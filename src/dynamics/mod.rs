@@ -10,6 +10,7 @@
 //! * [`control`]: the size and order of adaptive steps.
 //! * [`newton`]: Newton's method with line search on that balance.
 //! * [`failure`]: what can go wrong with a step.
+//! * `output`: states between steps that contact allows; `progress`: whether work still moves the time on.
 //! * [`predictor`]: past states: guesses, backward differences, dense output.
 //! * [`scheme`]: which terms a time-stepping scheme keeps and how it treats the fluid.
 //! * [`simulation`]: steps, retries, acceptance.
@@ -25,7 +26,9 @@ pub mod diagnostics;
 pub mod failure;
 pub mod model;
 pub mod newton;
+mod output;
 pub mod predictor;
+mod progress;
 pub mod scheme;
 pub mod simulation;
 mod solve;
