@@ -62,7 +62,8 @@ fn push_and_its_places_have_exact_derivatives() {
         };
         // Force and places have different units: each is compared by itself.
         let part = |keep: &[usize]| {
-            let mask = |all: [f64; 5]| std::array::from_fn(|i| if keep.contains(&i) { all[i] } else { 0.0 });
+            let mask =
+                |all: [f64; 5]| -> [f64; 5] { std::array::from_fn(|i| if keep.contains(&i) { all[i] } else { 0.0 }) };
             worst(&x, &exact.map(mask), |x| mask(value(x)))
         };
         assert!(part(&[0, 1, 2]) < 1e-5, "{round}: {}", part(&[0, 1, 2]));

@@ -219,8 +219,8 @@ class Capstan:
             fluid=Fluid(viscosity=0.1, model="RFT"),
             clamps=(Clamp(nodes=(self.last,), velocity=self.SPEED * self.pull), held(1, 4)),
             loads=(PointLoad(node=0, force=-self.LOAD * out[0]),),
-            # A rope pulled harder lies deeper in the range of contact, on a smaller circle: by its torque about
-            # the drum its tension grows by the ratio of the radii, 1.7 % at the default tolerance.
+            # A rope pulled harder lies deeper in the range of contact, on a smaller circle: by its torque
+            # about the drum its tension grows by the ratio of the radii, 1.7 % at the default tolerance.
             contact=Contact(friction=friction, slip_velocity=1e-3 * self.SPEED, tolerance=0.01),
         )
 
