@@ -219,7 +219,9 @@ class Capstan:
             fluid=Fluid(viscosity=0.1, model="RFT"),
             clamps=(Clamp(nodes=(self.last,), velocity=self.SPEED * self.pull), held(1, 4)),
             loads=(PointLoad(node=0, force=-self.LOAD * out[0]),),
-            contact=Contact(friction=friction, slip_velocity=1e-3 * self.SPEED),
+            # A rope pulled harder lies deeper in the range of contact, on a smaller circle: by its torque
+            # about the drum its tension grows by the ratio of the radii, 1.7 % at the default tolerance.
+            contact=Contact(friction=friction, slip_velocity=1e-3 * self.SPEED, tolerance=0.01),
         )
 
     def ratio(self, count: int = 20) -> float:
@@ -233,7 +235,7 @@ class Capstan:
         for _ in range(count):
             simulation.step()
             pulls.append(float(simulation.gradient()[at : at + 3] @ self.pull))
-        assert simulation.frame()["minimum_gap"] > -0.05 * (self.DRUM + self.ROPE)
+        assert simulation.frame()["minimum_gap"] > -0.01 * (self.DRUM + self.ROPE)
         return float(np.mean(pulls[count // 2 :])) / self.LOAD
 
     def theory(self) -> float:
