@@ -2,6 +2,18 @@
 
 from flagrs.validation import problems as _problems  # registers them  # noqa: F401
 from flagrs.validation.problem import PROBLEMS, Check, Curve, Evidence, Panel, Problem, problem
-from flagrs.validation.run import Outcome, validate
+from flagrs.validation.run import Outcome, chosen, solve, validate
 
-__all__ = ["PROBLEMS", "Check", "Curve", "Evidence", "Outcome", "Panel", "Problem", "problem", "validate"]
+__all__ = [
+    "PROBLEMS",
+    "Check",
+    "Curve",
+    "Evidence",
+    "Outcome",
+    "Panel",
+    "Problem",
+    "chosen",
+    "problem",
+    "solve",
+    "validate",
+]

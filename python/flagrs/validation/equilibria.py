@@ -48,7 +48,9 @@ def applied(scene: Scene, simulation: Simulation) -> FloatArray:
     return force
 
 
-def free_dofs(scene: Scene, simulation: Simulation, axes: tuple[int, ...] = (0, 1, 2)) -> npt.NDArray[np.intp]:
+def free_dofs(
+    scene: Scene, simulation: Simulation, axes: tuple[int, ...] = (0, 1, 2)
+) -> npt.NDArray[np.intp]:
     """Return the degrees of freedom that no clamp holds: coordinates of some axes, and all angles."""
     clamp = scene.clamps[0]
     nodes = np.setdiff1d(np.arange(len(simulation.nodes)), clamp.nodes)

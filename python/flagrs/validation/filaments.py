@@ -29,7 +29,8 @@ class Filament:
     def density(self, velocity: Array) -> Array:
         """Force per length on the fluid (N, 3) [N/m] at nodal velocities (N, 3) [m/s]."""
         matrix = fluid.mobility(self.nodes, self.edges, self.epsilon, threads=1)
-        return np.linalg.solve(matrix, 8.0 * math.pi * velocity.ravel()).reshape(-1, 3)
+        density = np.linalg.solve(matrix, 8.0 * math.pi * velocity.ravel())
+        return np.asarray(density, dtype=np.float64).reshape(-1, 3)
 
     def forces(self, velocity: Array) -> Array:
         """Nodal forces on the fluid (N, 3) [N]."""
@@ -53,7 +54,7 @@ def straight(length: float, count: int, epsilon: float) -> Filament:
 
 
 def graded_rod(length: float, epsilon: float, growth: float = 1.15) -> Filament:
-    """Return a straight filament whose edges are as long as epsilon at the ends and grow towards the middle."""
+    """Return a straight filament whose edges are as long as epsilon at the ends and grow inwards."""
     half = [0.0]
     edge = epsilon
     while half[-1] < length / 2.0:

@@ -68,12 +68,25 @@ class Check:
 
 @dataclass(frozen=True)
 class Curve:
-    """One line or set of marks of a panel: abscissae, ordinates, label, and a style as matplotlib has it."""
+    """One line or set of marks of a panel.
+
+    Attributes
+    ----------
+    x, y
+        Abscissae and ordinates (K,).
+    label
+        What the legend calls it; empty: nothing.
+    style
+        Marks and line as matplotlib writes them; ``--`` is drawn grey, as a guide to the eye.
+    paired
+        Whether it has the colour of the curve before it, with which it is compared.
+    """
 
     x: FloatArray
     y: FloatArray
     label: str = ""
     style: str = "o-"
+    paired: bool = False
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class Propulsion:
 
 
 def propulsion(nodes: Array, resist: Callable[[Array], Array], spin_torque: float = 0.0) -> Propulsion:
-    """Return the resistances of a rigid body along x, given the nodal forces (N, 3) at nodal velocities (N, 3)."""
+    """Return the resistances of a rigid body along x, given forces (N, 3) at velocities (N, 3)."""
     moved = resist(np.tile(X, (len(nodes), 1)))
     turned = resist(np.cross(X, nodes))
     return Propulsion(
@@ -96,7 +97,7 @@ def of_filament(filament: Filament, spin_torque: float = 0.0) -> Propulsion:
     return propulsion(filament.nodes, filament.forces, spin_torque)
 
 
-def of_model(helix: Helix, count: int, **options: object) -> Propulsion:
+def of_model(helix: Helix, count: int, **options: Any) -> Propulsion:
     """Return the resistances of a helix by one of the fluid models of a simulation."""
     nodes = helix.filament(count).nodes
     rod = Rod(
@@ -104,5 +105,5 @@ def of_model(helix: Helix, count: int, **options: object) -> Propulsion:
         radius=helix.thickness,
         material=Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1e3),
     )
-    matrix = Simulation(Scene(rods=(rod,), fluid=Fluid(viscosity=1.0, **options)), threads=1).resistance()  # type: ignore[arg-type]
+    matrix = Simulation(Scene(rods=(rod,), fluid=Fluid(viscosity=1.0, **options)), threads=1).resistance()
     return propulsion(nodes, lambda velocity: (matrix @ velocity.ravel()).reshape(-1, 3))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flagrs.errors import unknown_option
+from flagrs.errors import SceneError, unknown_option
 from flagrs.validation.problem import PROBLEMS, Check, Evidence, Problem
 
 
@@ -52,7 +52,9 @@ def chosen(names: Sequence[str] = ()) -> list[Problem]:
     """
     for name in names:
         if name not in PROBLEMS:
-            raise unknown_option(name, PROBLEMS)
+            hint = unknown_option(name, PROBLEMS)
+            message = str(hint).replace("unknown option", "unknown problem")
+            raise SceneError(message, field="only", value=name, allowed=hint.allowed)
     return [PROBLEMS[name] for name in names or PROBLEMS]
 
 
@@ -67,9 +69,7 @@ def solve(problem: Problem, full: bool = False) -> Outcome:
     return Outcome(problem, evidence, error, time.perf_counter() - start)
 
 
-def validate(
-    names: Sequence[str] = (), full: bool = False, progress: Callable[[Problem], None] | None = None
-) -> list[Outcome]:
+def validate(names: Sequence[str] = (), full: bool = False) -> list[Outcome]:
     """Solve problems one after the other.
 
     Parameters
@@ -78,17 +78,16 @@ def validate(
         Names of problems; empty for all.
     full
         Whether to use the finer settings.
-    progress
-        Called with each problem before it is solved.
 
     Raises
     ------
     SceneError
         If there is no such problem.
+
+    Examples
+    --------
+    >>> [outcome] = validate(["euler_column"])
+    >>> outcome.passed
+    True
     """
-    outcomes = []
-    for one in chosen(names):
-        if progress is not None:
-            progress(one)
-        outcomes.append(solve(one, full))
-    return outcomes
+    return [solve(one, full) for one in chosen(names)]

@@ -43,7 +43,8 @@ class Tube:
         second = np.cross(tangent, first)
         angle = 2.0 * math.pi * (np.arange(count) + 0.5 * (stagger % 2)) / count
         ring = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
-        return centre + radius * (math.sin(latitude) * tangent + math.cos(latitude) * ring)
+        surface: Array = centre + radius * (math.sin(latitude) * tangent + math.cos(latitude) * ring)
+        return surface
 
 
 def surface_solution(tube: Tube, step: float = 1.0, around: int = 6, depth: float = 0.5) -> Propulsion:

@@ -1,5 +1,7 @@
-"""The problems, a file for each kind; importing this registers them all."""
+"""The problems, a file for each kind; importing this imports every file here, and so registers them all."""
 
-from flagrs.validation.problems import buckling, cantilevers
+from importlib import import_module
+from pkgutil import iter_modules
 
-__all__ = ["buckling", "cantilevers"]
+for _file in iter_modules(__path__):
+    import_module(f"{__name__}.{_file.name}")

@@ -55,7 +55,11 @@ def _compared(
     curves = []
     for k, name in enumerate(_NAMES):
         curves.append(Curve(range_of_loads, lines[:, k], f"{name}, elastica", "-"))
-        curves.append(Curve(np.array(loads), np.array(marks)[:, k], f"{name}, {edge_counts[-1]} edges", "o"))
+        curves.append(
+            Curve(
+                np.array(loads), np.array(marks)[:, k], f"{name}, {edge_counts[-1]} edges", "o", paired=True
+            )
+        )
     return Evidence(
         tuple(checks),
         (
