@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from scipy.optimize import brentq
 
 from flagrs.scene.values import FloatArray
 
@@ -152,19 +153,35 @@ def problem(
     return register
 
 
-def observed_order(sizes: FloatArray, errors: FloatArray) -> float:
-    """Return the order of convergence between the two finest of a sequence.
+def observed_order(sizes: FloatArray, values: FloatArray, limit: float) -> float:
+    """Return the order of convergence of a sequence, NaN if it does not converge.
+
+    It comes from the three finest values alone, whatever they converge to, so that neither an error of the
+    model nor one of the expected value looks like one of the mesh. Of two values it is that of their distance
+    to the limit.
 
     Parameters
     ----------
     sizes
         Edge lengths or steps (K,), falling, in any unit.
-    errors
-        Errors (K,) at these sizes.
+    values
+        What was found with them (K,).
+    limit
+        The value expected for size zero.
     """
-    if len(sizes) < 2 or errors[-1] == 0.0 or errors[-2] / errors[-1] <= 0.0:
+    if len(values) == 2:
+        first, last = np.abs(values - limit)
+        return float(np.log(first / last) / np.log(sizes[0] / sizes[1])) if last > 0.0 else math.nan
+    (h0, h1, h2), (v0, v1, v2) = sizes[-3:], values[-3:]
+    if v1 == v2:
         return math.nan
-    return float(np.log(errors[-2] / errors[-1]) / np.log(sizes[-2] / sizes[-1]))
+    ratio = (v0 - v1) / (v1 - v2)
+
+    def excess(order: float) -> float:
+        return float((h0**order - h1**order) / (h1**order - h2**order) - ratio)
+
+    low, high = 0.05, 12.0
+    return float(brentq(excess, low, high)) if excess(low) < 0.0 < excess(high) else math.nan
 
 
 def extrapolated(sizes: FloatArray, values: FloatArray, order: float) -> float:
@@ -186,7 +203,7 @@ def converging(
     resolution: str = "",
     absolute: bool = False,
 ) -> Check:
-    """Return the check of a sequence: its limit by extrapolation, and the order of its errors.
+    """Return the check of a sequence: its limit by extrapolation, and its order.
 
     Parameters
     ----------
@@ -205,7 +222,7 @@ def converging(
         reason,
         absolute=absolute,
         resolution=resolution,
-        order=observed_order(sizes, values - expected),
+        order=observed_order(sizes, values, expected),
         expected_order=order,
         order_tolerance=order_tolerance,
     )

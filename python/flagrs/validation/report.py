@@ -71,7 +71,7 @@ def _opening(outcomes: Sequence[Outcome], full: bool) -> str:
             f"on {system}, Python {platform.python_version()}.\n{summary(outcomes)}.",
             "Expected values are published or computed by code that shares nothing with the simulator.\n"
             "Found values of a sequence of meshes or steps are extrapolated to zero size;\n"
-            "the order is that of the errors of the two finest, with the theoretical one in brackets.\n"
+            "the order is that of the three finest, with the theoretical one in brackets.\n"
             "Deviations are relative unless marked `abs.`",
             markdown_table(("problem", "what it is", "checks passed", "seconds", "passed"), rows),
         ]

@@ -103,8 +103,8 @@ def _modes(
 
 @problem(
     source="equations of beams; k^4 EI / (zeta L^4), zeta by J. Gray and G. J. Hancock (1955)",
-    quick={"edge_counts": (10, 20, 40), "modes": 2},
-    full={"edge_counts": (10, 20, 40, 80), "modes": 3},
+    quick={"edge_counts": (20, 40, 80), "modes": 2},
+    full={"edge_counts": (20, 40, 80, 160), "modes": 3},
 )
 def relaxation_rates(edge_counts: tuple[int, ...], modes: int) -> Evidence:
     """Rates at which a bent rod straightens in a viscous fluid with local drag, for three kinds of ends."""
@@ -114,8 +114,8 @@ def relaxation_rates(edge_counts: tuple[int, ...], modes: int) -> Evidence:
 
 @problem(
     source="characteristic equations of beams; frequencies k^2 (EI / rho A L^4)^(1/2), Euler and Bernoulli",
-    quick={"edge_counts": (10, 20, 40), "modes": 2},
-    full={"edge_counts": (10, 20, 40, 80), "modes": 3},
+    quick={"edge_counts": (20, 40, 80), "modes": 2},
+    full={"edge_counts": (20, 40, 80, 160), "modes": 3},
 )
 def vibration_frequencies(edge_counts: tuple[int, ...], modes: int) -> Evidence:
     """Frequencies of a slender rod without a fluid, from stiffness and mass of the simulator."""
