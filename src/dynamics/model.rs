@@ -22,8 +22,9 @@ use crate::fluid::twist_drag::TwistDrag;
 use crate::linear::LinearError;
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{HingeElement, Term};
-use crate::rod::configuration::{Configuration, ReferenceFrames, ShaftAngle};
+use crate::rod::configuration::{Configuration, ShaftAngle};
 use crate::rod::network::{Network, NetworkError};
+use crate::rod::reference::ReferenceFrames;
 use std::f64::consts::PI;
 
 /// A model cannot be built from its specification.

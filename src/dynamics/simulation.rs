@@ -18,7 +18,6 @@ use super::threads;
 use crate::Vec3;
 use crate::contact::spillmann::ContactSolver;
 use crate::elastic::motors::Drive;
-use crate::rod::configuration::ReferenceFrames;
 
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
@@ -161,7 +160,7 @@ impl Simulation {
         state.contact_anchor.clear();
         state.contacts.clear();
         state.control = Control::default();
-        rebase(&mut state.frames, network.edges(), nodes);
+        state.frames.follow_turned_over(network, nodes);
         if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
             return Err(ModelError::Shape { shape: "nodes" });
         }
@@ -441,17 +440,4 @@ fn keep_apart(
         guess.iter_mut().zip(&start).for_each(|(guess, start)| *guess = start + limit * (*guess - start));
     }
     Ok(())
-}
-
-/// Gives edges that have turned over completely since the reference a reference of their own: transport from
-/// antiparallel tangents is not unique.
-fn rebase(frames: &mut ReferenceFrames, edges: &[[usize; 2]], nodes: &[Vec3]) {
-    for (k, &[i, j]) in edges.iter().enumerate() {
-        let vector = nodes[j] - nodes[i];
-        let t = vector / vector.norm();
-        if 1.0 + frames.tangents[k].dot(&t) < 1e-4 {
-            frames.directors[k] = crate::rod::frames::transport_through(&frames.directors[k], &frames.tangents[k], &t);
-            frames.tangents[k] = t;
-        }
-    }
 }

@@ -3,8 +3,9 @@
 use super::control::Control;
 use super::predictor::History;
 use crate::Vec3;
-use crate::rod::configuration::{ReferenceFrames, node};
+use crate::rod::configuration::node;
 use crate::rod::network::Network;
+use crate::rod::reference::ReferenceFrames;
 
 /// A state of the scene.
 #[derive(Debug, Clone, PartialEq)]

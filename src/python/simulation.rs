@@ -14,7 +14,7 @@ use crate::dynamics::predictor::{History, Sample};
 use crate::dynamics::scheme::Scheme;
 use crate::dynamics::simulation as core;
 use crate::dynamics::state::State;
-use crate::rod::configuration::ReferenceFrames;
+use crate::rod::reference::ReferenceFrames;
 
 /// How often a long computation looks for Ctrl-C.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);

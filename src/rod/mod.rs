@@ -3,6 +3,7 @@
 //! * [`network`]: topology and the numbering of the degrees of freedom.
 //! * [`frames`]: parallel transport in space and time, reference twist, holonomy.
 //! * [`strain`]: curvature and twist of one hinge with exact first and second derivatives.
+//! * [`reference`]: frames that trial states are transported from.
 //! * [`configuration`]: everything about a trial state that several terms need, computed once.
 //! * [`assembly`]: how a term hands its gradient and Hessian blocks to the solver.
 
@@ -10,4 +11,5 @@ pub mod assembly;
 pub mod configuration;
 pub mod frames;
 pub mod network;
+pub mod reference;
 pub mod strain;

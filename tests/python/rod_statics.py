@@ -5,6 +5,18 @@ from __future__ import annotations
 import numpy as np
 from flagrs import Scene, scenarios
 from flagrs.validation.equilibria import settle
+from flagrs.validation.problems.rings import critical_twist, lowest_eigenvalue, michell, ring
+
+__all__ = [
+    "cantilever_compliance",
+    "cantilever_length",
+    "cantilever_tip",
+    "critical_twist",
+    "lowest_eigenvalue",
+    "michell",
+    "ring",
+    "settle",
+]
 
 
 def cantilever_tip(load: float, edge_count: int) -> np.ndarray:

@@ -73,6 +73,8 @@ def stiffer_twisting(factor: float) -> Any:
         "relaxation_rates",
         "vibration_frequencies",
         "relaxation_in_time",
+        "localized_buckling",
+        "whirling",
     ],
 )
 def test_a_bending_stiffness_off_by_half_a_per_cent_is_found(
