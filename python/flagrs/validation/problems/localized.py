@@ -52,14 +52,12 @@ def bulge(along: FloatArray, moment: float, tension: float) -> tuple[FloatArray,
     return inclination, azimuth
 
 
-def _started(count: int, moment: float, tension: float) -> tuple[Scene, FloatArray]:
-    """Return the rod placed on the theory's curve, twisted as theory has it, and its middles (count,) over L."""
+def _started(count: int, moment: float, tension: float) -> Scene:
+    """Return the rod placed on the theory's curve, and twisted as theory has it."""
     fine = np.linspace(-0.5, 0.5, 200 * count + 1)
     inclination, azimuth = bulge(fine, moment, tension)
-    tangent = np.stack(
-        [np.cos(inclination), np.sin(inclination) * np.cos(azimuth), np.sin(inclination) * np.sin(azimuth)],
-        axis=1,
-    )
+    across = np.sin(inclination)
+    tangent = np.stack([np.cos(inclination), across * np.cos(azimuth), across * np.sin(azimuth)], axis=1)
     curve = cumulative_simpson(tangent, x=fine, axis=0, initial=0.0) * LENGTH
     nodes = curve[::200]
     straight = np.stack(
@@ -83,9 +81,8 @@ def _started(count: int, moment: float, tension: float) -> tuple[Scene, FloatArr
 
 
 def _rested(count: int, moment: float, tension: float) -> tuple[float, float, float, Simulation]:
-    """Return moment and tension at rest, in EI / L and EI / L^2, the largest inclination [rad], and the rod."""
-    scene, _ = _started(count, moment, tension)
-    simulation = settle(scene)
+    """Return moment M L / EI, tension T L^2 / EI and largest inclination [rad] at rest, and the rod."""
+    simulation = settle(_started(count, moment, tension))
     twisting = simulation.energy()["twisting"]
     length = LENGTH * (1.0 - 1.0 / count)
     found = math.sqrt(2.0 * RATIO * twisting * length / EI) * LENGTH / length

@@ -35,7 +35,7 @@ def ring(edge_count: int, twist: float, stiffness_ratio: float, turns: int = 0) 
     )
     rod = scene.rods[0]
     bending = float(rod.EI_array()[0, 0, 0])
-    natural = np.broadcast_to(rod.natural_twist, edge_count).astype(float)
+    natural = np.broadcast_to(np.asarray(rod.natural_twist, dtype=float), edge_count)
     # At the hinge that closes the ring, edge angles fall back from the last to the first.
     closing = np.abs(np.diff(rod.hinge_array(), axis=1)[:, 0]) > 1
     natural = natural - 2.0 * math.pi * turns * closing
