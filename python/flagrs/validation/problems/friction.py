@@ -41,7 +41,7 @@ def incline(angle: float, friction: float, slip_velocity: float, lengthwise: boo
     )
     return Scene(
         rods=(rod, *rails),
-        fluid=Fluid(viscosity=1.0, model="RFT"),
+        fluid=Fluid(viscosity=1.0, model="RFT", density=0.0),
         clamps=(held(1, 20), held(2, 20)),
         gravity=GRAVITY * np.array([np.sin(angle), 0.0, -np.cos(angle)]),
         contact=Contact(

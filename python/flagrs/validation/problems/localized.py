@@ -75,9 +75,8 @@ def _started(count: int, moment: float, tension: float) -> Scene:
         theta=moment / RATIO * (middles - middles[0]),
     )
     ends = (Clamp(nodes=(0, 1), edges=(0,)), Clamp(nodes=(count - 1, count), edges=(count - 1,)))
-    return Scene(
-        rods=(rod,), fluid=Fluid(viscosity=1.0, model="RFT", density=0.0), clamps=ends
-    ), middles - 0.5
+    fluid = Fluid(viscosity=1.0, model="RFT", density=0.0)
+    return Scene(rods=(rod,), fluid=fluid, clamps=ends)
 
 
 def _rested(count: int, moment: float, tension: float) -> tuple[float, float, float, Simulation]:
