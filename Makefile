@@ -98,6 +98,7 @@ studies: $(VENV)/installed
 
 validation: $(VENV)/equipped
 	set -e; for script in docs/validation/make_*.py; do $(BIN)/python $$script; done
+	$(BIN)/flagrs validate --full --report docs/validation/report
 
 bench: $(VENV)/equipped
 	cargo bench --locked
