@@ -46,7 +46,7 @@ def column(weight: float, lean: float, rtol: float | None = None) -> Simulation:
 
 
 def relaxation(scene: Scene) -> float:
-    """Return the slowest relaxation time of the clamped column [s], zeta about 2.5 mu: zeta L^4 / 1.875^4 EI."""
+    """Return the slowest relaxation time of the column, zeta L^4 / 1.875^4 EI with zeta = 2.5 mu [s]."""
     return 2.5 * 0.1**4 / (1.875**4 * float(scene.rods[0].EI_array()[0, 0, 0]))
 
 
