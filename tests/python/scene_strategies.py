@@ -165,9 +165,7 @@ def scenes(draw: Draw, fluid: bool = False, free: bool = False, quiet: bool = Fa
     if fluid or draw(st.integers(0, 9)):
         parts["fluid"] = Fluid(
             viscosity=viscosity,
-            model=draw(
-                st.sampled_from(["RSS", "RFT"] if fluid else ["RSS", "RSS", "RSS", "RFT", "RFT", "none"])
-            ),
+            model=draw(st.sampled_from(models)),
             epsilon=draw(sometimes(decades(-2.0, 0.5).map(lambda ratio: ratio * edge), "slender")),
             coefficients=draw(st.sampled_from(["gray-hancock", "lighthill"])),
             twist_drag=draw(st.booleans()),
