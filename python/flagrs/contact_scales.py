@@ -94,7 +94,7 @@ def _drag(scene: Scene, rod: Rod) -> float:
 
 
 def _weight(scene: Scene, rod: Rod) -> float:
-    buoyancy = 0.0 if scene.fluid is None else scene.fluid.density
+    buoyancy = 0.0 if scene.fluid is None else scene.fluid.density_for_buoyancy
     area = math.pi * float(rod.radius_array().max()) ** 2
     return abs(rod.material.density - buoyancy) * area * float(np.linalg.norm(scene.gravity))
 
