@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flagrs.contact_scales import barrier_stiffness, slip_velocity
+from flagrs.contact_scales import SLIP_SHARE, contact_scales
 from flagrs.errors import SceneError, not_allowed
 from flagrs.scene import (
     Clamp,
@@ -238,13 +238,23 @@ def _contact(scene: Scene, contact: Contact) -> dict[str, Any]:
         if scene.head is None:
             raise not_allowed("contact.head_radius", contact.head_radius, "None in a scene without a head")
         spheres = [(scene.node_offset(scene.head.rod) + scene.head.node, contact.head_radius)]
+    scales = contact_scales(scene)
+    # One entry per body: edges in the scene's order, then spheres.
+    owner = np.repeat(np.arange(len(scene.rods)), [len(rod.edge_array()) for rod in scene.rods])
+    if spheres and scene.head is not None:
+        owner = np.append(owner, scene.head.rod)
+    slip = scales.velocity[owner] * SLIP_SHARE
     return {
         "barrier": contact.method == "barrier",
         "tolerance": contact.tolerance_or_default(),
         "max_iterations": contact.max_iterations,
-        "stiffness": barrier_stiffness(scene, contact),
+        "stiffness": contact.stiffness,
+        "driven": scales.driven[owner].tolist(),
+        "bent": scales.bent[owner].tolist(),
         "friction": contact.friction,
-        "slip_velocity": slip_velocity(scene, contact),
+        "slip_velocities": (
+            slip if contact.slip_velocity is None else np.full_like(slip, contact.slip_velocity)
+        ).tolist(),
         "spheres": spheres,
         "exclusion": EXCLUSION_FACTOR if contact.exclusion_factor is None else contact.exclusion_factor,
         "colliding": np.concatenate([rod.colliding_array() for rod in scene.rods]).tolist(),

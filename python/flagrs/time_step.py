@@ -59,7 +59,7 @@ def prescribed_rotations(scene: Scene) -> list[Signal]:
 
 def fastest_rate(scene: Scene) -> float:
     """Return the largest prescribed angular speed [rad/s]; 0 if nothing turns as prescribed."""
-    return max((_largest(signal) for signal in prescribed_rotations(scene)), default=0.0)
+    return max((largest(signal) for signal in prescribed_rotations(scene)), default=0.0)
 
 
 def samples() -> tuple[FloatArray, float]:
@@ -81,7 +81,8 @@ def _sample(signal: Signal, time: float) -> float:
         return 0.0
 
 
-def _largest(signal: Signal) -> float:
+def largest(signal: Signal) -> float:
+    """Return the largest magnitude of a signal, of a function of time over the first ten seconds."""
     if isinstance(signal, Table):
         return float(np.abs(signal.values).max())
     if callable(signal):

@@ -99,6 +99,7 @@ impl Simulation {
     /// One step from states that predict it.
     fn go_on(&mut self, limit: f64) -> Result<(), StepError> {
         for _ in 0..MOST_REJECTIONS {
+            self.check_progress()?;
             let wanted = self.state.control;
             let (end, at_jump) = self.end_before_jump(wanted.dt, limit)?;
             let dt = end - self.state.time;
@@ -128,6 +129,7 @@ impl Simulation {
         let wanted = self.state.control.dt;
         let mut closing_in = true;
         loop {
+            self.check_progress()?;
             let before = self.state.clone();
             let accepted = self.statistics.steps;
             let (end, at_jump) = self.end_before_jump(2.0 * self.state.control.dt, limit)?;

@@ -109,7 +109,7 @@ impl Simulation {
             balance.evaluate(model, step, found, &mut uncounted)?;
             balance.forget_slip();
             balance.linearize(model, step, &found.tensions, &mut uncounted).ok()?;
-            left = balance.correction(model, step, &mut uncounted).ok()?;
+            left = balance.correction(model, step, goal, &mut uncounted).ok()?.length;
             balance.last_correction(model, step, &found.tensions, &mut direction).ok()?;
             let from = found.q.clone();
             let parts = [(&mut found.q, &direction.q), (&mut found.density, &direction.density)];

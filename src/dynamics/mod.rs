@@ -14,6 +14,7 @@
 //! * [`newton`]: Newton's method with line search on that balance.
 //! * [`failure`]: what can go wrong with a step; `inputs`: what motors and clamps do over it.
 //! * [`interrupt`]: a way out of a long one.
+//! * `output`: states between steps that contact allows; `progress`: whether work still moves the time on.
 //! * [`predictor`]: past states: guesses, backward differences, dense output.
 //! * [`scheme`]: which terms a time-stepping scheme keeps and how it treats the fluid.
 //! * [`simulation`]: steps, retries, acceptance.
@@ -35,7 +36,9 @@ mod inputs;
 pub mod interrupt;
 pub mod model;
 pub mod newton;
+mod output;
 pub mod predictor;
+mod progress;
 mod round_off;
 pub mod scheme;
 pub mod simulation;

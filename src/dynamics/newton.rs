@@ -2,6 +2,7 @@
 
 use super::balance::{Balance, Step, Unknowns};
 use super::model::Model;
+use super::solve::Correction;
 use super::statistics::Statistics;
 use super::targets::Size;
 use crate::linear::LinearError;
@@ -47,6 +48,9 @@ const LINEAR_SHARE: f64 = 0.1;
 /// Loosest linear system, by goal: a residual that is to fall to its target, a correction that is to fall below its own.
 const LOOSEST: f64 = 1e-2;
 const LOOSEST_CORRECTION: f64 = 0.1;
+/// Change of a sliding velocity, over the larger of itself and the smoothing velocity, that may be left: where friction has
+/// turned over, the change that is asked for is half the smoothing velocity or more.
+const SLIP_SHARE: f64 = 0.1;
 /// How often, and by how much, the correction may grow under full steps.
 const UPHILL_ITERATIONS: usize = 3;
 const UPHILL: f64 = 2.0;
@@ -135,8 +139,8 @@ impl Newton<'_, '_> {
         self.balance.direction(self.model, self.step, tensions, tolerance, &mut self.work.direction, self.statistics)
     }
 
-    fn correction(&mut self) -> Result<f64, LinearError> {
-        self.balance.correction(self.model, self.step, self.statistics)
+    fn correction(&mut self, tolerance: f64) -> Result<Correction, LinearError> {
+        self.balance.correction(self.model, self.step, tolerance, self.statistics)
     }
 
     fn reduce_residual(&mut self, max_iterations: usize) -> Result<(), NewtonFailure> {
@@ -188,11 +192,12 @@ impl Newton<'_, '_> {
             self.go_on(size, iteration)?;
             let broken = |error: LinearError| failure(Some(size), iteration, &error.to_string());
             self.linearize().map_err(broken)?;
-            let correction = self.correction().map_err(broken)?;
-            if correction <= tolerance {
+            let correction = self.correction(tolerance).map_err(broken)?;
+            if correction.is_done(tolerance) {
                 self.polish();
                 return Ok(());
             }
+            let correction = correction.size(tolerance);
             let linear = (LINEAR_SHARE * tolerance / correction).clamp(LINEAR_TOLERANCE, LOOSEST_CORRECTION);
             self.find_direction(linear).map_err(broken)?;
             let full = self.full_length();
@@ -203,8 +208,9 @@ impl Newton<'_, '_> {
                 let sufficient = uphill * correction;
                 let trial = self.try_length(length);
                 length *= 0.5;
-                let left = self.correction().ok()?;
-                trial.filter(|_| left < sufficient.max(tolerance)).map(|trial| (trial, left))
+                let left = self.correction(tolerance).ok()?;
+                let better = left.is_done(tolerance) || left.size(tolerance) < sufficient;
+                trial.filter(|_| better).map(|trial| (trial, left))
             });
             let Some((trial, left)) = lower else {
                 if self.balance.define_contact() {
@@ -215,7 +221,7 @@ impl Newton<'_, '_> {
             };
             self.accept();
             size = trial;
-            if left <= tolerance {
+            if left.is_done(tolerance) {
                 self.polish();
                 return Ok(());
             }
@@ -238,6 +244,19 @@ impl Newton<'_, '_> {
             // The configuration goes back to what is kept.
             balance.place(model, step, &unknowns.q);
         }
+    }
+}
+
+impl Correction {
+    /// Whether neither displacements nor sliding velocities still matter. While a contact sticks, displacements are small however
+    /// large the force is that should make it slide: they alone do not tell.
+    fn is_done(&self, tolerance: f64) -> bool {
+        self.length <= tolerance && self.slip.relative <= SLIP_SHARE
+    }
+
+    /// One measure of both, m, linear in the correction: what the line search reduces.
+    fn size(&self, tolerance: f64) -> f64 {
+        self.length.max(tolerance * self.slip.over_smoothing / SLIP_SHARE)
     }
 }
 

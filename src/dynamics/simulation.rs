@@ -12,6 +12,7 @@ use super::interrupt::Hook;
 use super::model::{Model, ModelError};
 use super::newton::{self, Goal, NewtonSettings, NewtonWork};
 use super::predictor::{History, Sample};
+use super::progress::Progress;
 use super::scheme::Scheme;
 use super::specification::Specification;
 use super::state::State;
@@ -46,6 +47,7 @@ pub struct Simulation {
     pub(super) tolerance: Option<f64>,
     positions: Vec<Vec3>,
     stiffness: Vec<f64>,
+    pub(super) progress: Progress,
 }
 
 impl Simulation {
@@ -70,6 +72,7 @@ impl Simulation {
             extrapolated: state.q.clone(),
             positions: state.positions(&model.network),
             stiffness: Vec::new(),
+            progress: Progress::default(),
             settings: NewtonSettings::default(),
             statistics: Statistics::default(),
             fluid_step: None,
@@ -125,6 +128,7 @@ impl Simulation {
         }
         self.state = state;
         self.fluid_step = None;
+        self.progress = Progress::from(self.statistics.newton_iterations, self.state.time);
     }
 
     /// As [`Self::restore`], for a state from elsewhere.
@@ -192,6 +196,9 @@ impl Simulation {
         let result = loop {
             if left <= 0.5 * smallest {
                 break Ok(());
+            }
+            if let Err(stalled) = self.check_progress() {
+                break Err(stalled);
             }
             let dt = part.min(left);
             match self.try_step(dt, 1) {

@@ -21,6 +21,7 @@ use super::balance::{Balance, Step, Unknowns};
 use super::interrupt::Interrupt;
 use super::model::Model;
 use super::statistics::Statistics;
+use crate::contact::potential::SlipChange;
 use crate::fluid::FluidModel;
 use crate::linear::LinearError;
 use crate::linear::dense::DenseLu;
@@ -40,6 +41,17 @@ pub(super) struct Work {
     moved: Vec<f64>,
     density: Vec<f64>,
     unweighted: Vec<f64>,
+    /// How far every node yields to a force within the step, relative to the size of its filament, 1/N.
+    yielding: Vec<f64>,
+}
+
+/// What is still to be corrected of a trial solution.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Correction {
+    /// Largest displacement, relative to the size of its filament.
+    pub length: f64,
+    /// Changes of sliding velocities.
+    pub slip: SlipChange,
 }
 
 impl Work {
@@ -52,6 +64,7 @@ impl Work {
             moved: vec![0.0; dofs],
             density: vec![0.0; flow],
             unweighted: Vec::with_capacity(flow),
+            yielding: Vec::new(),
         }
     }
 }
@@ -70,13 +83,13 @@ impl Balance {
         self.differentiate(model, step, tensions);
         let assembled = Instant::now();
         statistics.seconds_assembly += (assembled - start).as_secs_f64();
-        let factored = self.fill_system(model, step.rate).and_then(|()| self.system.factor());
+        let factored = self.fill_system(model, step.rate).and_then(|symmetric| self.system.factor(symmetric));
         statistics.seconds_linear += assembled.elapsed().as_secs_f64();
         factored
     }
 
-    /// The matrix of the linear system: the model's, and contact's, whose pattern changes.
-    fn fill_system(&mut self, model: &Model, rate: f64) -> Result<(), LinearError> {
+    /// The matrix of the linear system: the model's, and contact's, whose pattern changes; whether it is nearly symmetric.
+    fn fill_system(&mut self, model: &Model, rate: f64) -> Result<bool, LinearError> {
         let contact = model.barrier().zip(self.barrier.as_mut());
         if let Some((_, barrier)) = contact.filter(|(_, barrier)| !barrier.is_bound()) {
             let node_dofs = model.network.node_dofs();
@@ -89,10 +102,9 @@ impl Balance {
         let values = self.system.values_mut();
         values.fill(0.0);
         self.embedding.iter().zip(&self.jacobian).for_each(|(&slot, value)| values[slot as usize] = *value);
-        if let (Some(law), Some(barrier)) = (model.barrier(), &self.barrier) {
-            barrier.add_matrix(law, rate, &model.prescribed, values);
-        }
-        Ok(())
+        let (Some(law), Some(barrier)) = (model.barrier(), &self.barrier) else { return Ok(true) };
+        barrier.add_matrix(law, rate, &model.prescribed, values);
+        Ok(barrier.is_symmetric(law))
     }
 
     /// Newton direction for the last residual, from the given tensions of edges; `tolerance` is the relative residual of the
@@ -113,9 +125,15 @@ impl Balance {
         solved
     }
 
-    /// Largest displacement, relative to the size of its filament, by which the last residual would be corrected were the fluid's
-    /// resistance local, with the factors of the last linearisation.
-    pub fn correction(&mut self, model: &Model, step: &Step, statistics: &mut Statistics) -> Result<f64, LinearError> {
+    /// How the last residual would be corrected were the fluid's resistance local, with the factors of the last linearisation;
+    /// displacements below `tolerance`, relative to the size of a filament, do not matter.
+    pub fn correction(
+        &mut self,
+        model: &Model,
+        step: &Step,
+        tolerance: f64,
+        statistics: &mut Statistics,
+    ) -> Result<Correction, LinearError> {
         let start = Instant::now();
         self.work.rhs.iter_mut().zip(&self.residual).for_each(|(rhs, residual)| *rhs = -residual);
         let Self { system, fluid, fluid_dofs, slip, work, .. } = self;
@@ -127,9 +145,31 @@ impl Balance {
         }
         let solved = system.solve_roughly(rhs, moved);
         let relative = moved.iter().zip(&model.error_weight).map(|(moved, weight)| moved.abs() * weight);
-        let largest = relative.fold(0.0, f64::max);
+        let length = relative.fold(0.0, f64::max);
+        let slip = self.slip_change(model, step, tolerance);
         statistics.seconds_linear += start.elapsed().as_secs_f64();
-        solved.map(|()| largest)
+        solved.map(|()| Correction { length, slip })
+    }
+
+    /// What the displacement at hand means for contacts with friction.
+    fn slip_change(&mut self, model: &Model, step: &Step, tolerance: f64) -> SlipChange {
+        let contact = model.barrier().zip(self.barrier.as_ref());
+        if !contact.is_some_and(|(law, barrier)| barrier.slides(law)) {
+            return SlipChange::default();
+        }
+        let dofs = model.network.node_dofs();
+        let mut yielding = std::mem::take(&mut self.work.yielding);
+        self.node_stiffness(model, step, &mut yielding);
+        for (stiffness, &dof) in yielding.iter_mut().zip(dofs) {
+            // Relative to the size of the node's filament, as the tolerance is.
+            *stiffness = if model.prescribed[dof] { 0.0 } else { model.error_weight[dof] / *stiffness };
+        }
+        let (law, barrier) = (model.barrier(), self.barrier.as_mut());
+        let change = law.zip(barrier).map_or_else(SlipChange::default, |(law, barrier)| {
+            barrier.slip_change(law, dofs, (&self.work.moved, step.rate), &yielding, tolerance)
+        });
+        self.work.yielding = yielding;
+        change
     }
 
     /// The correction that [`Self::correction`] has measured, as a direction from the given tensions of edges.
@@ -186,7 +226,7 @@ impl Balance {
             return system.solve_refined(&work.rhs, &mut out.q);
         };
         let pool = threads.pool();
-        let Work { rhs, seek, target, image, moved, density, unweighted } = work;
+        let Work { rhs, seek, target, image, moved, density, unweighted, .. } = work;
         // The image of b = 0 carries the force balance's own right-hand side.
         system.solve_checked(rhs, moved)?;
         let mut fluid_system = FluidSystem {

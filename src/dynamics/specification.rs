@@ -1,6 +1,7 @@
 //! What a scene says, as plain data in SI units; the scene's description in Python fills it in.
 
 use crate::Vec3;
+use crate::contact::stiffness::Stiffness;
 use crate::elastic::signal::Signal;
 use crate::fluid::product::FarFieldChoice;
 
@@ -91,12 +92,12 @@ pub enum ContactMethodSpecification {
     Barrier {
         /// Tolerance `delta`: contact acts between `1 - delta` and `1 + delta` sums of radii.
         tolerance: f64,
-        /// Stiffness, Pa.
-        stiffness: f64,
+        /// Stiffness of every pair.
+        stiffness: Stiffness,
         /// Coefficient of friction.
         friction: f64,
-        /// Velocity from which on contacts slide, m/s.
-        slip_velocity: f64,
+        /// Velocity from which on contacts of every body, edges before spheres, slide, m/s; the larger of two counts.
+        slip_velocities: Vec<f64>,
         /// Node and radius (m) of every sphere.
         spheres: Vec<(usize, f64)>,
     },

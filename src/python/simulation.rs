@@ -73,10 +73,10 @@ impl Simulation {
         })
     }
 
-    /// The frame at a time within the last step, interpolated.
+    /// The frame at a time within the last step, interpolated as far as contact allows.
     fn frame_at<'py>(&mut self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyDict>> {
         let present = self.inner.state().clone();
-        let then = self.inner.state_at(time).map_err(|error| step_error(py, error))?;
+        let then = self.inner.frame_state(time).map_err(|error| step_error(py, error))?;
         self.inner.restore(then);
         let frame = self.frame(py);
         self.inner.restore(present);

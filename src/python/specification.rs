@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use super::arrays::{pairs, points, values};
 use super::errors::scene_error;
 use crate::Vec3;
+use crate::contact::stiffness::Stiffness;
 use crate::dynamics::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
     HeadSpecification, MotorSpecification, Specification,
@@ -107,9 +108,11 @@ struct ContactInput {
     barrier: bool,
     tolerance: f64,
     max_iterations: usize,
-    stiffness: f64,
+    stiffness: Option<f64>,
+    driven: Vec<f64>,
+    bent: Vec<f64>,
     friction: f64,
-    slip_velocity: f64,
+    slip_velocities: Vec<f64>,
     spheres: Vec<(usize, f64)>,
     exclusion: f64,
     colliding: Vec<bool>,
@@ -201,10 +204,11 @@ impl SceneInput<'_> {
 }
 
 fn contact(input: ContactInput) -> ContactSpecification {
-    let ContactInput { tolerance, max_iterations, stiffness, friction, slip_velocity, spheres, .. } = input;
+    let ContactInput { tolerance, max_iterations, friction, slip_velocities, spheres, driven, bent, .. } = input;
+    let stiffness = input.stiffness.map_or(Stiffness::Typical { driven, bent }, Stiffness::Uniform);
     ContactSpecification {
         method: if input.barrier {
-            ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocity, spheres }
+            ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocities, spheres }
         } else {
             ContactMethodSpecification::SpillmannTeschner { tolerance, max_iterations }
         },

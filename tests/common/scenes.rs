@@ -4,6 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use flagrs::Vec3;
+use flagrs::contact::stiffness::Stiffness;
 use flagrs::dynamics::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
     HeadSpecification, MotorSpecification, Specification,
@@ -135,9 +136,9 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
 fn contact(colliding: Vec<bool>, stiffness: f64) -> ContactSpecification {
     let method = ContactMethodSpecification::Barrier {
         tolerance: 0.05,
-        stiffness,
+        stiffness: Stiffness::Uniform(stiffness),
         friction: 0.0,
-        slip_velocity: 1.0,
+        slip_velocities: Vec::new(),
         spheres: Vec::new(),
     };
     ContactSpecification { method, exclusion: FRAC_PI_2, colliding }
