@@ -101,7 +101,7 @@ class _RodScales:
         self.resistance = 4.0 * math.pi * viscosity / logarithm
         area = np.pi * radius**2
         self.mass = float((rod.density_array() * area).mean())
-        buoyancy = 0.0 if scene.fluid is None else scene.fluid.density
+        buoyancy = 0.0 if scene.fluid is None else scene.fluid.density_for_buoyancy
         weight = np.abs(rod.density_array() - buoyancy) * area
         self.load = float(weight.max()) * float(np.linalg.norm(scene.gravity))
         self.prescribed = 0.0

@@ -301,7 +301,8 @@ impl BarrierLaw {
     }
 
     /// What a change of all velocities is to the contacts with friction, as far as they matter: where friction that turned round
-    /// would displace the contact by more than `tolerance` (m), given how far every node yields to a force, `yielding` (m/N).
+    /// would displace the contact by more than `tolerance`, given how far every node yields to a force, `yielding` (per N, in the unit of the
+    /// tolerance).
     pub fn slip_change(
         &self,
         state: &BarrierState,

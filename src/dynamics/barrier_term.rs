@@ -112,6 +112,12 @@ impl BarrierTerm {
         }
     }
 
+    /// Energy at these degrees of freedom, J.
+    pub fn energy(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) -> f64 {
+        self.place(law, node_dofs, q);
+        law.energy(&self.state, &self.nodes)
+    }
+
     /// Whether all elements have their storage on the pattern they were bound to.
     pub fn is_bound(&self) -> bool {
         self.bound

@@ -50,7 +50,7 @@ impl Simulation {
         let Some(strongest) = strongest else { return Ok(()) };
         let reason = stall(law, &strongest, advanced);
         let worst = dofs[strongest.contact.nodes[0]];
-        Err(self.convergence_error(self.dt, f64::NAN, WINDOW as usize, worst, reason))
+        Err(self.convergence_error(self.dt, f64::NAN, WINDOW as usize, Some(worst), reason))
     }
 }
 

@@ -1,12 +1,14 @@
 //! A simulation: steps a model's state, retries with smaller steps, and keeps the last good state.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use super::balance::{Balance, Step, Unknowns};
+use super::budget::Accepted;
 use super::contact_model::ContactModel;
-use super::control::Control;
+use super::control::{Control, Estimate};
 use super::failure::{StepError, TryError};
+use super::inputs::Inputs;
+use super::interrupt::Hook;
 use super::model::{Model, ModelError};
 use super::newton::{self, Goal, NewtonSettings, NewtonWork};
 use super::predictor::{History, Sample};
@@ -15,11 +17,9 @@ use super::scheme::Scheme;
 use super::specification::Specification;
 use super::state::State;
 use super::statistics::Statistics;
-use super::threads;
+use super::threads::Threads;
 use crate::Vec3;
 use crate::contact::spillmann::ContactSolver;
-use crate::elastic::motors::Drive;
-use crate::rod::configuration::ReferenceFrames;
 
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
@@ -38,7 +38,7 @@ pub struct Simulation {
     pub(super) scheme: Scheme,
     pub(super) dt: f64,
     pub(super) settings: NewtonSettings,
-    work: NewtonWork,
+    pub(super) work: NewtonWork,
     contact: Option<ContactSolver>,
     pub(super) statistics: Statistics,
     fluid_step: Option<u64>,
@@ -60,8 +60,7 @@ impl Simulation {
         if let Some(overlap) = model.overlap(&state) {
             return Err(ModelError::Overlap(overlap));
         }
-        let pool = threads::pool(thread_count);
-        let balance = Balance::new(&model, pool.as_ref().map(Arc::clone))?;
+        let balance = Balance::new(&model, Threads(thread_count))?;
         let contact = model.contact.as_ref().and_then(ContactModel::spillmann).map(ContactSolver::new);
         let mut state = state;
         state.density = balance.zero_density(scheme);
@@ -135,8 +134,13 @@ impl Simulation {
     /// As [`Self::restore`], for a state from elsewhere.
     ///
     /// # Errors
-    /// [`ModelError::Overlap`] if barrier contact cannot go on from there; the present state is then kept.
+    /// As [`State::check`]; [`ModelError::Shape`] if it is not a configuration; [`ModelError::Overlap`] if barrier contact
+    /// cannot go on from there. The present state is then kept.
     pub fn adopt(&mut self, state: State) -> Result<(), ModelError> {
+        state.check(&self.model, &self.state)?;
+        if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
+            return Err(ModelError::Shape { shape: "nodes" });
+        }
         if let Some(overlap) = self.model.overlap(&state).filter(|_| self.model.barrier().is_some()) {
             return Err(ModelError::Overlap(overlap));
         }
@@ -165,10 +169,8 @@ impl Simulation {
         state.contact_anchor.clear();
         state.contacts.clear();
         state.control = Control::default();
-        rebase(&mut state.frames, network.edges(), nodes);
-        if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
-            return Err(ModelError::Shape { shape: "nodes" });
-        }
+        state.account = super::budget::Account::default();
+        state.frames.follow_turned_over(network, nodes);
         self.adopt(state)
     }
 
@@ -201,6 +203,7 @@ impl Simulation {
             let dt = part.min(left);
             match self.try_step(dt, 1) {
                 Ok(_) => left -= dt,
+                Err(TryError::Interrupted) => break Err(StepError::Interrupted),
                 Err(TryError::Signal(error)) => break Err(StepError::Signal(error)),
                 Err(TryError::Solve { residual, iterations, worst, reason }) => {
                     self.statistics.rejected_steps += 1;
@@ -224,20 +227,24 @@ impl Simulation {
         dt: f64,
         residual: f64,
         iterations: usize,
-        worst: usize,
+        worst: Option<usize>,
         reason: String,
     ) -> StepError {
         let smallest_gap = self.smallest_gap().unwrap_or(f64::INFINITY);
         let dofs = self.model.network.node_dofs();
+        let advice = match self.tolerance {
+            None => "a smaller dt, or rtol in its place, may help",
+            Some(_) => "a finer mesh there, a slower drive or a smaller rtol may help",
+        };
         StepError::Convergence {
             time: self.state.time,
             step: self.state.steps,
             dt,
-            residual,
+            residual: Some(residual).filter(|residual| residual.is_finite()),
             iterations,
             smallest_gap,
-            worst_node: dofs.partition_point(|&dof| dof <= worst).saturating_sub(1),
-            reason,
+            worst_node: worst.map(|worst| dofs.partition_point(|&dof| dof <= worst).saturating_sub(1)),
+            reason: format!("{reason}; {advice}"),
         }
     }
 
@@ -245,22 +252,36 @@ impl Simulation {
     pub(super) fn try_step(&mut self, dt: f64, order: usize) -> Result<bool, TryError> {
         let order = order.min(self.state.history.past.len() + 1);
         let (t0, t1) = (self.state.time, self.state.time + dt);
+        self.balance.interrupt.begin();
         let mut trial = std::mem::take(&mut self.trial);
+        self.open_account();
         let prepared = self.prepare(&mut trial, t0, t1);
-        let solved = prepared.and_then(|motors| self.solve(motors, dt, order, &mut trial));
+        let solved = prepared.and_then(|Inputs { angles, torques, departure, impulses, .. }| {
+            let angles = self.solve((angles, torques), dt, order, &mut trial)?;
+            Ok((angles, departure, impulses))
+        });
         self.trial = trial;
-        let angles = solved?;
+        if self.balance.interrupt.stopped() {
+            return Err(self.interrupted());
+        }
+        let (angles, departure, impulses) = solved?;
         let missed = self.state.history.prediction_errors(
             (t0, &self.state.q),
             (t1, &self.trial.q),
-            &self.model.force_weight,
+            &self.model.error_weight,
             &mut self.extrapolated,
         );
         let mut accepted = true;
         if let Some(tolerance) = self.tolerance {
             let times = self.state.history.times(t0, usize::MAX);
-            let control = Control { dt, order };
-            (self.state.control, accepted) = control.judge(&times, t1, &missed, tolerance);
+            let control = Control { order, ..self.state.control };
+            let mut unseen = departure / self.angle_tolerance() * tolerance;
+            for (dof, impulse) in impulses {
+                unseen = unseen.max(self.balance.response(&self.model, dof)? * impulse / dt);
+            }
+            let highest_order = self.scheme.highest_order();
+            let estimate = Estimate { missed: &missed, unseen, tolerance, highest_order };
+            (self.state.control, accepted) = control.judge(&times, t1, &estimate);
         }
         if accepted {
             self.accept(angles, dt, order, &missed);
@@ -268,32 +289,33 @@ impl Simulation {
         Ok(accepted)
     }
 
-    /// Motor angles and torques at the end of the step; the guess, with the prescribed degrees of freedom set.
-    fn prepare(&self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<(Vec<f64>, Vec<f64>), TryError> {
-        let mut angles = self.state.motor_angles.clone();
-        let mut torques = vec![0.0; angles.len()];
-        for (k, motor) in self.model.motors.iter().enumerate() {
-            match &motor.drive {
-                Drive::Speed(signal) => angles[k] += signal.integral(t0, t1)?,
-                Drive::Torque { signal, .. } => torques[k] = signal.value(t1)?,
-            }
-        }
+    /// Back to the last good state, as if the step had not been tried.
+    fn interrupted(&mut self) -> TryError {
+        self.restore(self.state.clone());
+        TryError::Interrupted
+    }
+
+    /// Sets what is asked every 50 ms of a step whether to give it up; `None` lets every step come to its end.
+    pub fn set_interrupt(&mut self, hook: Option<Hook>) {
+        self.balance.interrupt.set(hook);
+    }
+
+    /// What motors and clamps do over the step; the guess, with the prescribed degrees of freedom set.
+    fn prepare(&self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<Inputs, TryError> {
+        let inputs = Inputs::new(&self.model, &self.state.motor_angles, (t0, t1))?;
         let state = &self.state;
         let order = state.history.guess_order();
         state.history.extrapolate(order, (t0, &state.q), |sample| &sample.q, t1, &mut guess.q);
         state.history.extrapolate(order, (t0, &state.density), |sample| &sample.density, t1, &mut guess.density);
         guess.tensions.copy_from_slice(&state.tensions);
         let target = &mut guess.q;
-        for clamp in &self.model.clamps {
+        for (clamp, turn) in self.model.clamps.iter().zip(&inputs.turns) {
             for &dof in &clamp.nodes {
                 (0..3).for_each(|c| target[dof + c] = state.q[dof + c] + (t1 - t0) * clamp.velocity[c]);
             }
-            if !clamp.edges.is_empty() {
-                let turn = clamp.angular_velocity.integral(t0, t1)?;
-                clamp.edges.iter().for_each(|&dof| target[dof] = state.q[dof] + turn);
-            }
+            clamp.edges.iter().for_each(|&dof| target[dof] = state.q[dof] + turn);
         }
-        Ok((angles, torques))
+        Ok(inputs)
     }
 
     /// Solves the step from the guess, contact included; the motor angles at its end.
@@ -383,9 +405,18 @@ impl Simulation {
         Err(TryError::Solve {
             residual: f64::NAN,
             iterations: law.max_iterations(),
-            worst: 0,
+            worst: None,
             reason: format!("contact left an overlap of {violation:.2e} of the sum of radii"),
         })
+    }
+
+    /// Begins the account of energies at the present state, if none has begun.
+    fn open_account(&mut self) {
+        let Self { state, balance, model, scheme, .. } = self;
+        if state.account.start.is_none() && balance.energies(model, state).is_some() {
+            let stored = balance.stored(model, &state.q, &state.velocity, scheme.has_inertia());
+            state.account.begin(state.time, stored);
+        }
     }
 
     fn accept(&mut self, angles: Vec<f64>, dt: f64, order: usize, missed: &[f64]) {
@@ -394,7 +425,18 @@ impl Simulation {
         let increment = step.increment();
         let velocity: Vec<f64> =
             self.trial.q.iter().enumerate().map(|(dof, &value)| increment.rate_of(dof, value)).collect();
+        let account = self.balance.account(&Accepted {
+            model: &self.model,
+            step: &step,
+            q: &self.trial.q,
+            velocity: &velocity,
+            density: &self.trial.density,
+            motor_angles: &angles,
+            dt,
+            order,
+        });
         let state = &mut self.state;
+        state.account = account;
         let replaced = Sample {
             time: state.time,
             q: std::mem::replace(&mut state.q, self.trial.q.clone()),
@@ -439,7 +481,7 @@ fn keep_apart(
     let prescribed = model.prescribed.iter().zip(start.iter_mut().zip(&*guess));
     prescribed.filter(|(held, _)| **held).for_each(|(_, (start, end))| *start = *end);
     let blocked =
-        |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: 0, reason: reason.to_owned() };
+        |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: None, reason: reason.to_owned() };
     if balance.step_limit(model, from, &start, statistics) < 1.0 {
         return Err(blocked("what is prescribed moves filaments into each other"));
     }
@@ -448,17 +490,4 @@ fn keep_apart(
         guess.iter_mut().zip(&start).for_each(|(guess, start)| *guess = start + limit * (*guess - start));
     }
     Ok(())
-}
-
-/// Gives edges that have turned over completely since the reference a reference of their own: transport from
-/// antiparallel tangents is not unique.
-fn rebase(frames: &mut ReferenceFrames, edges: &[[usize; 2]], nodes: &[Vec3]) {
-    for (k, &[i, j]) in edges.iter().enumerate() {
-        let vector = nodes[j] - nodes[i];
-        let t = vector / vector.norm();
-        if 1.0 + frames.tangents[k].dot(&t) < 1e-4 {
-            frames.directors[k] = crate::rod::frames::transport_through(&frames.directors[k], &frames.tangents[k], &t);
-            frames.tangents[k] = t;
-        }
-    }
 }

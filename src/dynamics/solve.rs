@@ -18,6 +18,7 @@ use std::time::Instant;
 use rayon::ThreadPool;
 
 use super::balance::{Balance, Step, Unknowns};
+use super::interrupt::Interrupt;
 use super::model::Model;
 use super::statistics::Statistics;
 use crate::contact::potential::SlipChange;
@@ -39,14 +40,15 @@ pub(super) struct Work {
     image: Vec<f64>,
     moved: Vec<f64>,
     density: Vec<f64>,
-    /// How far every node yields to a force within the step, m/N.
+    /// How far every node yields to a force within the step, over the size of its filament, 1/N.
     yielding: Vec<f64>,
+    unweighted: Vec<f64>,
 }
 
 /// What is still to be corrected of a trial solution.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Correction {
-    /// Largest displacement, m.
+    /// Largest displacement, relative to the size of its filament.
     pub length: f64,
     /// Changes of sliding velocities.
     pub slip: SlipChange,
@@ -62,6 +64,7 @@ impl Work {
             moved: vec![0.0; dofs],
             density: vec![0.0; flow],
             yielding: Vec::new(),
+            unweighted: Vec::with_capacity(flow),
         }
     }
 }
@@ -123,7 +126,7 @@ impl Balance {
     }
 
     /// How the last residual would be corrected were the fluid's resistance local, with the factors of the last linearisation;
-    /// displacements below `tolerance` (m) do not matter.
+    /// displacements below `tolerance`, relative to the size of their filament, do not matter.
     pub fn correction(
         &mut self,
         model: &Model,
@@ -141,8 +144,8 @@ impl Balance {
             resist_locally(model, fluid, fluid_dofs, scale, seek, rhs);
         }
         let solved = system.solve_roughly(rhs, moved);
-        let lengths = moved.iter().zip(&model.force_weight).map(|(moved, weight)| moved.abs() / weight);
-        let length = lengths.fold(0.0, f64::max);
+        let relative = moved.iter().zip(&model.error_weight).map(|(moved, weight)| moved.abs() * weight);
+        let length = relative.fold(0.0, f64::max);
         let slip = self.slip_change(model, step, tolerance);
         statistics.seconds_linear += start.elapsed().as_secs_f64();
         solved.map(|()| Correction { length, slip })
@@ -158,7 +161,7 @@ impl Balance {
         let mut yielding = std::mem::take(&mut self.work.yielding);
         self.node_stiffness(model, step, &mut yielding);
         for (stiffness, &dof) in yielding.iter_mut().zip(dofs) {
-            *stiffness = if model.prescribed[dof] { 0.0 } else { stiffness.recip() };
+            *stiffness = if model.prescribed[dof] { 0.0 } else { model.error_weight[dof] / *stiffness };
         }
         let (law, barrier) = (model.barrier(), self.barrier.as_mut());
         let change = law.zip(barrier).map_or_else(SlipChange::default, |(law, barrier)| {
@@ -166,6 +169,43 @@ impl Balance {
         });
         self.work.yielding = yielding;
         change
+    }
+
+    /// The correction that [`Self::correction`] has measured, as a direction from the given tensions of edges.
+    pub fn last_correction(
+        &mut self,
+        model: &Model,
+        step: &Step,
+        tensions: &[f64],
+        out: &mut Unknowns,
+    ) -> Result<(), LinearError> {
+        out.q.copy_from_slice(&self.work.moved);
+        model.stretching.tension_changes(&self.configuration, &out.q, tensions, &mut out.tensions);
+        let Self { system, fluid, fluid_dofs, work, .. } = self;
+        let Some(fluid) = implicit_nonlocal(fluid, step) else { return Ok(()) };
+        let mut pair = FluidSystem {
+            model,
+            rate: step.rate,
+            sparse: system,
+            fluid,
+            fluid_dofs,
+            rhs: None,
+            moved: &mut work.moved,
+            density: &mut out.density,
+            pool: None,
+            roughly: true,
+        };
+        pair.complete(&work.seek)
+    }
+
+    /// Largest displacement, m, that a unit of force on one degree of freedom makes within the step, with the factors of the
+    /// last linearisation.
+    pub fn response(&mut self, model: &Model, dof: usize) -> Result<f64, LinearError> {
+        let Work { rhs, moved, .. } = &mut self.work;
+        rhs.fill(0.0);
+        rhs[dof] = 1.0;
+        self.system.solve_roughly(rhs, moved)?;
+        Ok(moved.iter().zip(&model.force_weight).map(|(moved, weight)| moved.abs() / weight).fold(0.0, f64::max))
     }
 
     fn solve(
@@ -177,11 +217,12 @@ impl Balance {
         statistics: &mut Statistics,
     ) -> Result<(), LinearError> {
         self.work.rhs.iter_mut().zip(&self.residual).for_each(|(rhs, residual)| *rhs = -residual);
-        let Self { system, gmres, fluid, fluid_dofs, slip, work, pool, .. } = self;
+        let Self { system, gmres, fluid, fluid_dofs, slip, work, threads, interrupt, targets, .. } = self;
         let Some(fluid) = implicit_nonlocal(fluid, step) else {
             return system.solve_refined(&work.rhs, &mut out.q);
         };
-        let Work { rhs, seek, target, image, moved, density, .. } = work;
+        let pool = threads.pool();
+        let Work { rhs, seek, target, image, moved, density, unweighted, .. } = work;
         // The image of b = 0 carries the force balance's own right-hand side.
         system.solve_checked(rhs, moved)?;
         let mut fluid_system = FluidSystem {
@@ -194,7 +235,10 @@ impl Balance {
             moved,
             density,
             pool: pool.as_deref(),
+            interrupt,
             roughly: false,
+            weights: &targets.slip_weight,
+            unweighted,
         };
         seek.fill(0.0);
         fluid_system.complete(seek)?;
@@ -202,15 +246,18 @@ impl Balance {
         fluid_system.rhs = None;
         fluid_system.roughly = tolerance >= SINGLE_PRECISION;
         target.iter_mut().zip(slip.iter()).zip(image.iter()).for_each(|((t, slip), image)| *t = -slip - image);
+        let weights = fluid_system.weights;
+        target.iter_mut().zip(weights).for_each(|(t, weight)| *t *= weight);
         match gmres.solve(&mut fluid_system, target, seek, tolerance) {
             Ok(iterations) => statistics.krylov_iterations += iterations as u64,
-            Err(error) if fluid_system.is_matrix_free() => return Err(error),
+            Err(error) if fluid_system.is_matrix_free() || error == LinearError::Interrupted => return Err(error),
             Err(_) => {
                 statistics.dense_solves += 1;
                 fluid_system.roughly = false;
                 fluid_system.solve_densely(target, seek)?;
             }
         }
+        seek.iter_mut().zip(weights).for_each(|(b, weight)| *b /= weight);
         fluid_system.rhs = Some(rhs);
         fluid_system.pair(seek)?;
         out.q.copy_from_slice(fluid_system.moved);
@@ -248,8 +295,12 @@ struct FluidSystem<'a> {
     moved: &'a mut [f64],
     density: &'a mut [f64],
     pool: Option<&'a ThreadPool>,
+    interrupt: &'a mut Interrupt,
     /// Whether single precision will do.
     roughly: bool,
+    /// Weights of the equation's rows, and of the unknowns: no filament's is then hidden behind another's.
+    weights: &'a [f64],
+    unweighted: &'a mut Vec<f64>,
 }
 
 impl FluidSystem<'_> {
@@ -284,6 +335,9 @@ impl FluidSystem<'_> {
     }
 
     fn product(&mut self, image: &mut [f64]) -> Result<(), LinearError> {
+        if self.interrupt.requested() {
+            return Err(LinearError::Interrupted);
+        }
         let Some(mobility) = self.fluid.nonlocal() else { return Ok(()) };
         if self.roughly {
             mobility.apply_roughly(self.density, image, self.pool)?;
@@ -306,7 +360,7 @@ impl FluidSystem<'_> {
         let mut unit = vec![0.0; target.len()];
         for (k, column) in dense.matrix_mut().chunks_exact_mut(target.len()).enumerate() {
             unit[k] = 1.0;
-            self.image(&unit, column)?;
+            self.apply(&unit, column)?;
             unit[k] = 0.0;
         }
         dense.factor()?;
@@ -317,7 +371,13 @@ impl FluidSystem<'_> {
 
 impl LinearOperator for FluidSystem<'_> {
     fn apply(&mut self, x: &[f64], out: &mut [f64]) -> Result<(), LinearError> {
-        self.image(x, out)
+        let mut b = std::mem::take(self.unweighted);
+        b.clear();
+        b.extend(x.iter().zip(self.weights).map(|(x, weight)| x / weight));
+        let applied = self.image(&b, out);
+        *self.unweighted = b;
+        out.iter_mut().zip(self.weights).for_each(|(out, weight)| *out *= weight);
+        applied
     }
 
     fn precondition(&mut self, _: &mut [f64]) -> Result<(), LinearError> {

@@ -18,13 +18,13 @@ pub struct MotorSpecification {
     pub signal: Signal,
 }
 
-/// The seed's head.
-#[derive(Debug, Clone, Copy)]
+/// The robot's head.
+#[derive(Debug, Clone)]
 pub struct HeadSpecification {
     /// Its node.
     pub node: usize,
-    /// The nodes before and after it.
-    pub neighbours: [usize; 2],
+    /// The edges at that node that are fixed to it, one to [`crate::fluid::head::MOST_EDGES`].
+    pub edges: Vec<usize>,
     /// `C_t 6 pi mu r_h`, N s/m.
     pub translation: f64,
     /// `C_r 8 pi mu r_h^3`, N m s.
@@ -153,6 +153,8 @@ pub struct Specification {
     pub loads: Vec<(usize, Vec3)>,
     /// Gravity, m/s^2.
     pub gravity: Vec3,
+    /// Reynolds number of every node over its speed, s/m: density times size over viscosity, zero for dry ones; may be empty.
+    pub reynolds: Vec<f64>,
     /// Fluid.
     pub fluid: Option<FluidSpecification>,
     /// Contact.

@@ -8,7 +8,7 @@
 //! * [`rss`]: nonlocal drag by regularized Stokeslet segments.
 //! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
 //! * [`twist_drag`]: resistance of an edge to spinning about its own centreline.
-//! * [`head`]: drag and counter-torque of the seed's head.
+//! * [`head`]: drag of a head, and its couple about all axes.
 
 pub mod far_field;
 pub mod head;

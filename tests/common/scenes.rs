@@ -117,6 +117,7 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
         clamps: vec![],
         loads: vec![],
         gravity: Vec3::zeros(),
+        reynolds: vec![],
         fluid: Some(FluidSpecification {
             viscosity: substance.viscosity,
             model: FluidModelSpecification::StokesletSegments {
@@ -180,7 +181,7 @@ pub fn robot(normalized_pitch: f64, rpm: f64) -> Specification {
     let head_radius = 31e-3_f64;
     scene.head = Some(HeadSpecification {
         node: base + 4,
-        neighbours: [base + 3, base + 5],
+        edges: vec![base + 3, base + 4],
         translation: 4.1 * 6.0 * PI * ROBOT.viscosity * head_radius,
         rotation: 0.9 * 8.0 * PI * ROBOT.viscosity * head_radius.powi(3),
         mass: 0.0,

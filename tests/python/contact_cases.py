@@ -121,7 +121,7 @@ def incline(angle: float, friction: float, slip_velocity: float, lengthwise: boo
     )
     return Scene(
         rods=(rod, *rails),
-        fluid=Fluid(viscosity=1.0, model="RFT"),
+        fluid=Fluid(viscosity=1.0, model="RFT", density=0.0),
         clamps=(held(1, 20), held(2, 20)),
         gravity=GRAVITY * np.array([np.sin(angle), 0.0, -np.cos(angle)]),
         contact=Contact(
@@ -471,7 +471,7 @@ def heap(count: int = 10, friction: float = 0.0, seed: int = 1) -> Scene:
         )
     return Scene(
         rods=(*rods, *rails),
-        fluid=Fluid(viscosity=1.0, model="RFT"),
+        fluid=Fluid(viscosity=1.0, model="RFT", density=0.0),
         clamps=tuple(held(count + k, 4) for k in range(len(rails))),
         contact=Contact(friction=friction),
         gravity=np.array([0.0, 0.0, -GRAVITY]),

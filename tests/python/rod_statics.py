@@ -56,16 +56,19 @@ def michell(stiffness_ratio: float) -> float:
 
 
 def lowest_stiffness(edge_count: int, twist: float, stiffness_ratio: float) -> float:
-    """Return the ring's lowest eigenvalue of the Hessian over EI / L^3, motions without deformation left out.
+    """Return `lowest_eigenvalue` of a flat ring with this natural twist, its frames not turned."""
+    return lowest_eigenvalue(Simulation(ring(edge_count, twist, stiffness_ratio), threads=1))
+
+
+def lowest_eigenvalue(simulation: Simulation) -> float:
+    """Return a ring's lowest eigenvalue of the Hessian over EI / L^3, motions without deformation left out.
 
     These are six rigid motions and the turning of all material frames about the centreline, which costs
     nothing where the rod is naturally straight and its section round. Angles count as displacements by L.
     """
-    scene = ring(edge_count, twist, stiffness_ratio)
-    rod = scene.rods[0]
+    rod = simulation.scene.rods[0]
     length = float(rod.rest_lengths().sum())
     scale = float(rod.EI_array()[0, 0, 0]) / length**3
-    simulation = Simulation(scene, threads=1)
     nodes, edges = simulation.nodes, simulation.edges
     tangents = nodes[edges[:, 1]] - nodes[edges[:, 0]]
     tangents /= np.linalg.norm(tangents, axis=1)[:, None]

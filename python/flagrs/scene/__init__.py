@@ -10,7 +10,7 @@ from flagrs.scene.motor import Motor
 from flagrs.scene.plan import Plan
 from flagrs.scene.rod import Rod
 from flagrs.scene.scene import Scene
-from flagrs.scene.signal import Signal, Table, signal_value
+from flagrs.scene.signal import Signal, Table, TimeFunction, signal_value
 
 __all__ = [
     "Clamp",
@@ -25,5 +25,6 @@ __all__ = [
     "Scene",
     "Signal",
     "Table",
+    "TimeFunction",
     "signal_value",
 ]

@@ -23,7 +23,7 @@ class Clamp(Part):
         Clamped nodes of the rod.
     edges : tuple of int
         Edges of the rod whose angle is clamped.
-    angular_velocity : float, Table or function of time
+    angular_velocity : float, Table, TimeFunction or function of time
         Angular velocity of the clamped edges about their tangent, right-handed [rad/s].
     velocity : ndarray
         Velocity (3,) of the clamped nodes [m/s].

@@ -50,14 +50,65 @@ class Table(Part):
         return float(np.interp(time, self.times, self.values))
 
 
-Signal = float | Table | Callable[[float], float]
+#: Length [s] below which nothing of a function needs to be found by itself, where none is given.
+RESOLUTION = 1e-2
+
+
+def _function(value: Any) -> Any:
+    if not callable(value):
+        raise not_allowed("function", value, "a function of time")
+    return value
+
+
+class TimeFunction(Part):
+    """A function of time with what the steps should know of it.
+
+    A bare Python function will do where it is smooth. Every step looks at a function in panels no longer than
+    its resolution, whatever the tolerance, so that a pulse as long as that is always found.
+
+    Attributes
+    ----------
+    function : callable
+        Value at a time [s], in the unit of the field it is given for: a finite number at every time.
+    breaks : ndarray
+        Instants (n,) [s], strictly increasing, at which the function may jump or have a corner: adaptive
+        steps end there.
+    resolution : float
+        Length [s] below which nothing of the function needs to be found by itself; 10 ms if not given. A step
+        of more than ten thousand such lengths is looked at in ten thousand panels.
+
+    Examples
+    --------
+    >>> switch = TimeFunction(function=lambda time: 2.0 if time > 1.0 else 0.0, breaks=[1.0])
+    >>> switch(0.5), switch(1.5)
+    (0.0, 2.0)
+    """
+
+    function: Annotated[Callable[[float], float], PlainValidator(_function)]
+    breaks: Annotated[FloatArray, PlainValidator(Array((("n",),), Bounds("s")))] = np.zeros(0)
+    resolution: Annotated[float, PlainValidator(Array(((),), Bounds("s", above=0.0)))] = RESOLUTION
+
+    @model_validator(mode="after")
+    def _check(self) -> TimeFunction:
+        steps = np.diff(self.breaks)
+        if (steps <= 0.0).any():
+            worst = int(np.argmax(steps <= 0.0)) + 1
+            raise not_allowed(f"breaks[{worst}]", self.breaks[worst], "later than the instant before it")
+        return self
+
+    def __call__(self, time: float) -> float:
+        """Return the value at a time [s]."""
+        return self.function(time)
+
+
+Signal = float | Table | TimeFunction | Callable[[float], float]
 
 _number = Array(((),), Bounds("1"))
 
 
 def _signal(value: Any) -> Any:
     if isinstance(value, dict):
-        return Table(**value)
+        return TimeFunction(**value) if "function" in value else Table(**value)
     if callable(value):
         return value
     return _number(value)
@@ -76,7 +127,7 @@ def signal_value(signal: Signal, time: float) -> float:
     Parameters
     ----------
     signal
-        A number, a `Table` or a function of time.
+        A number, a `Table`, a `TimeFunction` or a function of time.
     time
         Time [s].
 
