@@ -152,8 +152,8 @@ fn wind(specification: &mut Specification, twist: f64) {
     }
 }
 
-/// Bending energy of a bent, naturally straight chain of round sections whose hinges are twisted by `twist`, and the largest
-/// derivative of its energy with respect to an angle where it is not twisted.
+/// Bending energy of a bent, naturally straight chain of round sections whose hinges are twisted by `twist`; with one edge
+/// `turned`, it runs against its hinges.
 fn bending_energy(twist: f64, turned: bool) -> f64 {
     let mut random = Random::new(5);
     let straight: Vec<Vec3> = (0..7).map(|k| Vec3::new(k as f64, 0.0, 0.0)).collect();

@@ -1,7 +1,7 @@
 """Makes every number and figure of rods.md: rods, motors and schemes against closed forms and each other.
 
 Run with ``python docs/validation/make_rod_figures.py`` (five minutes on one core; needs matplotlib); names of
-parts may follow. It uses the problems of the tests, tests/python/rod_statics.py, rod_motion.py, elastica.py.
+parts may follow. It uses problems of `flagrs validate`, and tests/python/rod_statics.py and rod_motion.py.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from flagrs import Clamp, Fluid, Material, Motor, PointLoad, Rod, Scene, Simulation, scenarios
 from flagrs.plot.canvas import COLOURS, GREY, dress, legend, new_figure
+from flagrs.validation.elastica import tip_deflection
+from flagrs.validation.problems.rings import critical_twist, lowest_stiffness, michell
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
 
-from elastica import tip_deflection  # noqa: E402
 from rod_motion import (  # noqa: E402
     disturbance_grows,
     imbalance,
@@ -30,9 +31,6 @@ from rod_motion import (  # noqa: E402
 from rod_statics import (  # noqa: E402
     cantilever_compliance,
     cantilever_tip,
-    critical_twist,
-    lowest_stiffness,
-    michell,
 )
 from rod_twist import (  # noqa: E402
     WHIRLING,

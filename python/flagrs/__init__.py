@@ -1,7 +1,7 @@
 """Soft helical filaments swimming at low Reynolds number: discrete elastic rods in Stokes flow."""
 
 from flagrs import contact, fluid, scenarios
-from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError
+from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError, StabilityWarning
 from flagrs.guards import EnergyWarning, FlagrsWarning, MeshWarning, ReynoldsWarning, StrainWarning
 from flagrs.scene import (
     Clamp,
@@ -43,6 +43,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
+    "StabilityWarning",
     "StrainWarning",
     "Suggestion",
     "Table",

@@ -1,4 +1,4 @@
-"""The command ``flagrs``: run scenes, draw them, repeat the studies, check the installation."""
+"""The command ``flagrs``: run scenes, draw them, repeat the studies, validate, check the installation."""
 
 from __future__ import annotations
 
@@ -166,6 +166,39 @@ def study(
     for row in failed:
         typer.echo(f"failed: {row['file']}: {row['error']}", err=True)
     if failed:
+        raise typer.Exit(FAILED)
+
+
+@app.command()
+def validate(
+    full: Annotated[bool, typer.Option("--full", help="Finer meshes and longer runs: some minutes.")] = False,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", help="Name of a problem to solve; repeatable.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Folder for a report, Markdown with figures as PNG and PDF.")
+    ] = None,
+    listed: Annotated[bool, typer.Option("--list", help="Only say what problems there are.")] = False,
+) -> None:
+    """Solve problems with known answers and compare: found, expected, tolerance, order of convergence."""
+    from flagrs import validation  # the other commands do without
+    from flagrs.validation import table
+    from flagrs.validation.report import write_report
+
+    console = Console(markup=False, highlight=False)
+    console.width = max(console.width, table.WIDTH)
+    problems = validation.chosen(only or ())
+    if listed:
+        console.print(table.problem_table(problems))
+        return
+    outcomes = []
+    for problem in problems:
+        outcomes.append(validation.solve(problem, full))
+        console.print(table.text_table(outcomes[-1]))
+    typer.echo(table.summary(outcomes))
+    if report is not None:
+        typer.echo(f"saved             {write_report(report, outcomes, full)}")
+    if not all(outcome.passed for outcome in outcomes):
         raise typer.Exit(FAILED)
 
 

@@ -49,7 +49,7 @@ def default_step(scene: Scene) -> float:
     if steps:
         return float(min(steps))
     slowest = max((found.time for found in relaxations), default=0.0)
-    return RELAXATION_SHARE * slowest if slowest > 0.0 else STEP_OF_NOTHING
+    return _rounded(RELAXATION_SHARE * slowest) if slowest > 0.0 else STEP_OF_NOTHING
 
 
 def _turning_step(signal: object) -> float:
@@ -81,8 +81,7 @@ def _unbalanced(network: Network, relaxations: list[Relaxation]) -> list[float]:
         # Where the forces would take it in its own time, free motions included: (K + rate R) u = F.
         stiffness = network.stiffness[dofs][:, dofs]
         resistance = network.resistance[dofs][:, dofs]
-        square = found.rate if found.time * found.rate < 2.0 else found.rate**2
-        matrix = (stiffness + square * resistance).tocsc()
+        matrix = (stiffness + found.eigenvalue * resistance).tocsc()
         displaced = scipy.sparse.linalg.spsolve(matrix, forces[dofs])
         at_nodes = np.isin(dofs, (network.node_dofs[:, None] + np.arange(3)).ravel())
         amplitude = float(np.abs(displaced[at_nodes]).max(initial=0.0)) / found.size
@@ -92,13 +91,18 @@ def _unbalanced(network: Network, relaxations: list[Relaxation]) -> list[float]:
             # Stress without a force, as in a twisted ring, may be unstable: it may move as far as its energy
             # takes the slowest mode.
             own = resistance.diagonal()[at_nodes].sum() / 3.0
-            reach = math.sqrt(2.0 * network.energy(label) / (square * own))
+            reach = math.sqrt(2.0 * network.energy(label) / (found.eigenvalue * own))
             amplitude = max(amplitude, reach / found.size)
         if not np.isfinite(amplitude) or amplitude > NOTICED:
-            steps.append(RELAXATION_SHARE * found.time)
+            steps.append(_rounded(RELAXATION_SHARE * found.time))
         elif amplitude > 0.0:
-            steps.append(MOVE_PER_STEP * found.time / amplitude)
+            steps.append(_rounded(MOVE_PER_STEP * found.time / amplitude))
     return steps
+
+
+def _rounded(step: float) -> float:
+    """Return a step to three digits: the last ones of an eigenvalue change with the machine."""
+    return float(f"{step:.2e}")
 
 
 def _clamp_speeds(network: Network) -> FloatArray:

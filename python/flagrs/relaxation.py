@@ -24,6 +24,10 @@ DENSE = 120
 FEWEST_MODES, MOST_MODES = 12, 200
 #: Drag of dry edges in wet filaments, over that of a wet one: too small to slow anything, not to divide by.
 DRY_SHARE = 1e-2
+#: First root of cos(k) cosh(k) = 1: wave number of the slowest mode of a free rod, times its length.
+FREE_ROOT = 4.73
+#: First root of cos(k) cosh(k) = -1, for a rod clamped at one end.
+CLAMPED_ROOT = 1.875
 #: Slowest rate that may be elastic, over the least that stiffness, length and drag allow.
 ELASTIC_SHARE = 0.1
 #: Filaments examined: where there are more, half of these that look slowest and half that look fastest.
@@ -38,16 +42,16 @@ class Relaxation:
     ----------
     dofs : ndarray
         Its degrees of freedom (n,), ascending.
-    rate : float
-        Smallest rate of decay that is not zero [1/s]; in a vacuum, the smallest angular frequency.
+    eigenvalue : float
+        Smallest rate of decay that is not zero [1/s]; in a vacuum, the smallest angular frequency squared.
     time : float
-        Time of relaxation, 1 / rate [s]; in a vacuum, the period.
+        Time of relaxation, one over the rate [s]; in a vacuum, the period.
     size : float
         A twentieth of the filament's extent [m].
     """
 
     dofs: IntArray
-    rate: float
+    eigenvalue: float
     time: float
     size: float
 
@@ -248,17 +252,20 @@ class Network:
         dofs = np.sort(order[starts[label] : starts[label + 1]])
         stiffness = self.stiffness[dofs][:, dofs]
         resistance = self.resistance[dofs][:, dofs]
-        eigenvalue = _slowest(stiffness, resistance, float(self._least[label]))
+        least = float(self._least[label])
+        try:
+            eigenvalue = _slowest(stiffness, resistance, least)
+        except (np.linalg.LinAlgError, scipy.sparse.linalg.ArpackError, RuntimeError):
+            # Stiffnesses too far apart to find eigenvalues: a clamped beam as soft as the softest part.
+            eigenvalue = CLAMPED_ROOT**4 * least / ELASTIC_SHARE
         if eigenvalue is None:
             return None
-        wet = bool(self.is_wet[label])
-        rate = eigenvalue if wet else math.sqrt(eigenvalue)
         edges = self.edges[(self.labels[self.node_dofs[self.edges]] == label).any(axis=1)]
         extent = np.ptp(self._native["rest_nodes"][edges].reshape(-1, 3), axis=0)
         return Relaxation(
             dofs=dofs,
-            rate=rate,
-            time=1.0 / rate if wet else 2.0 * math.pi / rate,
+            eigenvalue=eigenvalue,
+            time=1.0 / eigenvalue if self.is_wet[label] else 2.0 * math.pi / math.sqrt(eigenvalue),
             size=float(np.linalg.norm(extent)) / 20.0,
         )
 
@@ -300,8 +307,8 @@ def _bare(scene: Scene) -> Scene:
 def slender_coefficients(scene: Scene) -> FloatArray:
     """Return drag per length along and across every edge (E, 2) [N s/m^2] that stands for nonlocal drag.
 
-    That of a slender body, 4 pi mu / (ln(2 L / a) + 1/2) across and half of it along, L being the immersed
-    length of the rod.
+    That of a slender body which bends with the wave number k of a free rod's slowest mode, k L = 4.73 with
+    the immersed length L: 4 pi mu / (ln(2 / (k a)) - gamma + 1/2) across and half of it along.
     """
     fluid = scene.fluid
     if fluid is None or fluid.model == "none":
@@ -312,6 +319,7 @@ def slender_coefficients(scene: Scene) -> FloatArray:
 def _slender(fluid: Fluid, rod: Rod) -> FloatArray:
     lengths, immersed = rod.rest_lengths(), rod.immersed_array()
     contour = float(lengths[immersed].sum()) or float(lengths.sum())
-    logarithm = np.maximum(np.log(2.0 * contour / rod.radius_array()), 0.5) + 0.5
+    logarithm = np.log(2.0 * contour / (FREE_ROOT * rod.radius_array())) - np.euler_gamma
+    logarithm = np.maximum(logarithm, 0.5) + 0.5
     across = 4.0 * np.pi * fluid.viscosity / logarithm
     return np.stack([0.5 * across, across], axis=1)

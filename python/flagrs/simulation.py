@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from pathlib import Path
@@ -16,7 +17,7 @@ from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
 from flagrs.budget import statistics_of
 from flagrs.default_step import default_step
-from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
+from flagrs.errors import FileError, FlagrsError, SceneError, StabilityWarning, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.flow import flow_of, immersed_edges
@@ -31,9 +32,9 @@ from flagrs.scene.shapes import number, whole
 from flagrs.scene.values import Bounds, FloatArray, IntArray
 from flagrs.threads import thread_count
 from flagrs.time_step import (
-    LOCAL_SHARE,
     STABLE_SHARE,
     explicit_limit,
+    local_tolerance,
 )
 from flagrs.trajectory import Trajectory
 
@@ -63,7 +64,8 @@ class Simulation:
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
         Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
-        motor or less where filaments relax faster; a fifth of the stability limit for the explicit scheme.
+        motor or less where filaments relax faster; a fifth of the stability limit for the explicit scheme,
+        which warns (`flagrs.StabilityWarning`) of longer ones than that limit.
     rtol
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
         of node positions, relative to the size of the filament they are on (docs/theory/time.md). None:
@@ -119,9 +121,10 @@ class Simulation:
         self._guards = Guards(scene)
         self._restored: Path | None = None
         if rtol is not None:
-            self._native.set_tolerance(LOCAL_SHARE * rtol)
+            self._native.set_tolerance(local_tolerance(scene, rtol))
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
+        self._check_stability()
 
     @classmethod
     def restore(cls, path: str | Path, scene: Scene | None = None) -> Self:
@@ -166,6 +169,7 @@ class Simulation:
     @dt.setter
     def dt(self, value: float) -> None:
         self._native.dt = number("dt", value, Bounds("s", above=0.0))
+        self._check_stability()
 
     @property
     def time(self) -> float:
@@ -328,6 +332,7 @@ class Simulation:
                 self._guards.look(self._native.account())
                 if recorder.frame_count % CHECKPOINT_FRAMES == 0:
                     recorder.checkpoint(self.state())
+                    self._check_stability()
                 if progress is not None:
                     progress(time)
             recorder.checkpoint(self.state())
@@ -423,6 +428,22 @@ class Simulation:
         """Return the longest stable step of the explicit scheme [s]: 2 / lambda_max(M^-1 Res)."""
         rows = (self.dof_of_node[:, None] + np.arange(3)).ravel()
         return explicit_limit(self.resistance(), self.mass[rows])
+
+    def _check_stability(self) -> None:
+        """Warn of steps of the explicit scheme that are longer than its limit at the present shape."""
+        if self.scheme != "explicit":
+            return
+        try:
+            limit = self.stable_step()
+        except FlagrsError:  # too many nodes for a resistance: the limit cannot be known
+            return
+        if self.dt > limit:
+            warnings.warn(
+                f"dt: {self.dt:g} s is above the explicit scheme's stability limit, {limit:g} s: unless "
+                "elasticity raises it, the motion is wrong; take a smaller dt, or scheme='implicit'",
+                StabilityWarning,
+                stacklevel=3,
+            )
 
     @property
     def minimum_gap(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flagrs.errors import SceneError
 from flagrs.scene import Rod, Scene
 from flagrs.scene.signal import Signal, Table, signal_value
 from flagrs.scene.values import FloatArray
@@ -21,6 +22,16 @@ GOLDEN = 0.6180339887498949
 
 #: Local error of a step over the relative error asked for (measured: docs/performance.md, "rtol holds").
 LOCAL_SHARE = 0.2
+
+
+#: Largest local error of a step, in edges: a larger one turns edges by more than their frames and drag allow.
+EDGE_SHARE = 7e-3
+
+
+def local_tolerance(scene: Scene, rtol: float) -> float:
+    """Return the local error that steps may have, relative to each filament's size, and an edge's at most."""
+    edges = min(float(np.median(rod.rest_lengths())) / rod_size(rod) for rod in scene.rods)
+    return min(LOCAL_SHARE * rtol, EDGE_SHARE * edges)
 
 
 def size(scene: Scene) -> float:
@@ -62,12 +73,20 @@ def samples() -> tuple[FloatArray, float]:
     return np.sort(np.concatenate([even, decades])), 1e-6
 
 
+def _sample(signal: Signal, time: float) -> float:
+    """Return a signal's value [rad/s]; 0 where it has none, which the run may never reach."""
+    try:
+        return signal_value(signal, time)
+    except SceneError:
+        return 0.0
+
+
 def largest(signal: Signal) -> float:
     """Return the largest magnitude of a signal, of a function of time over the first ten seconds."""
     if isinstance(signal, Table):
         return float(np.abs(signal.values).max())
     if callable(signal):
-        return max(abs(signal_value(signal, float(time))) for time in samples()[0])
+        return max(abs(_sample(signal, float(time))) for time in samples()[0])
     return abs(float(signal))
 
 

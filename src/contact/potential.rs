@@ -301,8 +301,8 @@ impl BarrierLaw {
     }
 
     /// What a change of all velocities is to the contacts with friction, as far as they matter: where friction that turned round
-    /// would displace the contact by more than `tolerance`, given how far every node yields to a force, `yielding` (per N, in the unit of the
-    /// tolerance).
+    /// would displace the contact by more than `tolerance`, given how far every node yields to a force, `yielding` (1/N); both are relative to
+    /// the sizes of filaments.
     pub fn slip_change(
         &self,
         state: &BarrierState,

@@ -38,8 +38,9 @@ impl Simulation {
 
     /// What the tolerance lets prescribed angles miss within a step, rad.
     pub(super) fn angle_tolerance(&self) -> f64 {
-        let weight = self.model.force_weight.iter().fold(0.0, |largest: f64, weight| largest.max(*weight));
-        self.tolerance.map_or(f64::INFINITY, |length| length * weight)
+        let angles = self.model.network.edge_dofs().iter().map(|&dof| self.model.error_weight[dof]);
+        let weight = angles.fold(0.0, f64::max);
+        self.tolerance.filter(|_| weight > 0.0).map_or(f64::INFINITY, |error| error / weight)
     }
 
     /// Makes one adaptive step, not beyond `limit`; at the start, and after a corner of what drives the scene, two.
@@ -48,8 +49,13 @@ impl Simulation {
     /// As [`Self::step`].
     pub fn adaptive_step(&mut self, limit: f64) -> Result<(), StepError> {
         let start = Instant::now();
+        let before = self.state.clone();
         self.begin_anew_at_a_break();
         let result = if self.state.history.past.is_empty() { self.start(limit) } else { self.go_on(limit) };
+        if matches!(result, Err(StepError::Interrupted)) {
+            // Tries that were rejected have left their mark: what goes on from here must not know of them.
+            self.restore(before);
+        }
         self.statistics.seconds_total += start.elapsed().as_secs_f64();
         result
     }
@@ -120,7 +126,10 @@ impl Simulation {
     /// if it is too large.
     fn start(&mut self, limit: f64) -> Result<(), StepError> {
         self.let_jump(limit)?;
+        let wanted = self.state.control.dt;
+        let mut closing_in = true;
         loop {
+            self.check_progress()?;
             let before = self.state.clone();
             let accepted = self.statistics.steps;
             let (end, at_jump) = self.end_before_jump(2.0 * self.state.control.dt, limit)?;
@@ -137,6 +146,12 @@ impl Simulation {
             self.state.control = control;
             self.statistics.steps = accepted;
             self.shrink(both.map(|_| ()), dt, limit)?;
+            if closing_in && self.state.control.dt < INSTANT * self.scale(limit) {
+                // The steps close in on a jump that nothing has told of.
+                closing_in = false;
+                self.let_jump(limit)?;
+                self.state.control.dt = wanted;
+            }
         }
     }
 
@@ -160,6 +175,7 @@ impl Simulation {
                 }
                 self.state.history = History::default();
             }
+            Err(TryError::Interrupted) => return Err(StepError::Interrupted),
             Err(TryError::Signal(error)) => return Err(StepError::Signal(error)),
             Ok(false) | Err(TryError::Solve { .. }) => self.restore(before.clone()),
         }
@@ -183,6 +199,7 @@ impl Simulation {
                 Err(self.convergence_error(dt, f64::NAN, 0, None, reason))
             }
             Ok(()) => Ok(()),
+            Err(TryError::Interrupted) => Err(StepError::Interrupted),
             Err(TryError::Signal(error)) => Err(StepError::Signal(error)),
             Err(TryError::Solve { residual, iterations, worst, reason }) => {
                 self.state.control = self.state.control.failed(dt);

@@ -40,9 +40,9 @@ pub(super) struct Work {
     image: Vec<f64>,
     moved: Vec<f64>,
     density: Vec<f64>,
-    /// How far every node yields to a force within the step, over the size of its filament, 1/N.
-    yielding: Vec<f64>,
     unweighted: Vec<f64>,
+    /// How far every node yields to a force within the step, relative to the size of its filament, 1/N.
+    yielding: Vec<f64>,
 }
 
 /// What is still to be corrected of a trial solution.
@@ -63,8 +63,8 @@ impl Work {
             image: vec![0.0; flow],
             moved: vec![0.0; dofs],
             density: vec![0.0; flow],
-            yielding: Vec::new(),
             unweighted: Vec::with_capacity(flow),
+            yielding: Vec::new(),
         }
     }
 }
@@ -126,7 +126,7 @@ impl Balance {
     }
 
     /// How the last residual would be corrected were the fluid's resistance local, with the factors of the last linearisation;
-    /// displacements below `tolerance`, relative to the size of their filament, do not matter.
+    /// displacements below `tolerance`, relative to the size of a filament, do not matter.
     pub fn correction(
         &mut self,
         model: &Model,
@@ -161,6 +161,7 @@ impl Balance {
         let mut yielding = std::mem::take(&mut self.work.yielding);
         self.node_stiffness(model, step, &mut yielding);
         for (stiffness, &dof) in yielding.iter_mut().zip(dofs) {
+            // Relative to the size of the node's filament, as the tolerance is.
             *stiffness = if model.prescribed[dof] { 0.0 } else { model.error_weight[dof] / *stiffness };
         }
         let (law, barrier) = (model.barrier(), self.barrier.as_mut());
@@ -181,7 +182,7 @@ impl Balance {
     ) -> Result<(), LinearError> {
         out.q.copy_from_slice(&self.work.moved);
         model.stretching.tension_changes(&self.configuration, &out.q, tensions, &mut out.tensions);
-        let Self { system, fluid, fluid_dofs, work, .. } = self;
+        let Self { system, fluid, fluid_dofs, work, targets, interrupt, .. } = self;
         let Some(fluid) = implicit_nonlocal(fluid, step) else { return Ok(()) };
         let mut pair = FluidSystem {
             model,
@@ -193,19 +194,22 @@ impl Balance {
             moved: &mut work.moved,
             density: &mut out.density,
             pool: None,
+            interrupt,
             roughly: true,
+            weights: &targets.slip_weight,
+            unweighted: &mut work.unweighted,
         };
         pair.complete(&work.seek)
     }
 
-    /// Largest displacement, m, that a unit of force on one degree of freedom makes within the step, with the factors of the
-    /// last linearisation.
+    /// Largest displacement, relative to the size of a filament, that a unit of force on one degree of freedom makes within the
+    /// step, with the factors of the last linearisation.
     pub fn response(&mut self, model: &Model, dof: usize) -> Result<f64, LinearError> {
         let Work { rhs, moved, .. } = &mut self.work;
         rhs.fill(0.0);
         rhs[dof] = 1.0;
         self.system.solve_roughly(rhs, moved)?;
-        Ok(moved.iter().zip(&model.force_weight).map(|(moved, weight)| moved.abs() / weight).fold(0.0, f64::max))
+        Ok(moved.iter().zip(&model.error_weight).map(|(moved, weight)| moved.abs() * weight).fold(0.0, f64::max))
     }
 
     fn solve(

@@ -30,6 +30,8 @@ impl State {
         range("state.control_step", dt, dt.is_finite() && dt >= 0.0, "a finite time >= 0 s")?;
         let order = self.control.order;
         range("state.control_order", order as f64, (1..=HIGHEST_ORDER).contains(&order), "1, 2 or 3")?;
+        let ceiling = self.control.ceiling;
+        range("state.control_ceiling", ceiling, ceiling > 0.0, "> 0 s")?;
         self.check_history(dofs, flow)?;
         self.check_frames(like)?;
         self.check_contacts(model)

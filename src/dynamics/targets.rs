@@ -115,7 +115,7 @@ impl Targets {
         let mut count = |force: f64, target: f64, dof: usize| {
             size.norm = size.norm.max(force);
             // A residual that is not a number is larger than any.
-            if !(force <= size.excess * target) {
+            if force > size.excess * target || force.is_nan() {
                 size.excess = force / target;
                 size.worst = dof;
             }
@@ -137,7 +137,9 @@ impl Targets {
     /// Weights the next merits, and the fluid's equation in the linear solver, by what is to be reached where.
     pub fn weigh(&mut self, model: &Model, fluid_dofs: &[usize]) {
         for dof in 0..self.weight.len() {
-            self.weight[dof] = 1.0 / self.target(model, dof);
+            let target = self.target(model, dof);
+            // An angle that nothing resists has no target, and no residual either.
+            self.weight[dof] = if target > 0.0 { 1.0 / target } else { 0.0 };
         }
         let free = model.filaments.all().iter().filter(|filament| !filament.held);
         let smallest = free.map(|filament| filament.size).fold(f64::INFINITY, f64::min).min(f64::MAX);

@@ -14,7 +14,7 @@ const CUT: f64 = 0.41;
 const MOST_PANELS: f64 = 10_000.0;
 const MOST_HALVINGS: usize = 4_000;
 /// Error of a panel, relative to the integral of the magnitude over the span, below which it is not halved.
-const TARGET: f64 = 1e-11;
+const TARGET: f64 = 1e-12;
 /// Halvings of a panel from which on a jump is inside: a corner does not need as many.
 const DEEP: u32 = 24;
 /// Width of a panel, relative to the largest instant, that is not halved any more.
@@ -101,6 +101,7 @@ pub fn course<E>(
     let mut out = Course::default();
     let mut reached: Vec<(f64, f64)> = Vec::with_capacity(panels.len());
     let mut halvings = 0;
+    let (mut deepest, mut passed) = (DEEP - 1, false);
     while let Some(Panel { start: a, end: b, integral, error, depth, .. }) = panels.pop() {
         if error > target && b - a > narrowest && halvings < MOST_HALVINGS {
             halvings += 1;
@@ -112,9 +113,11 @@ pub fn course<E>(
         out.integral += integral;
         out.uncertainty += error;
         reached.push((b, out.integral));
-        if depth >= DEEP && out.jump.is_none() {
-            out.jump = Some(a);
+        // The first run of narrow panels closes in on the first jump.
+        if depth > deepest && !passed {
+            (deepest, out.jump) = (depth, Some(a));
         }
+        passed |= out.jump.is_some() && depth < DEEP;
     }
     out.departure = departure(&reached, (start, span), ends, out.integral);
     Ok(out)

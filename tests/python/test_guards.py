@@ -6,6 +6,7 @@ import flagrs
 import numpy as np
 import pytest
 from flagrs.flow import immersed_edges
+from flagrs.guards import notices
 
 SOFT = flagrs.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
 
@@ -94,6 +95,15 @@ def test_steps_far_too_long_for_what_happens_warn_of_lost_energy():
         simulation.run(until=400.0, save_every=100.0, path=False)  # each kind once
     assert [notice.kind for notice in simulation.warnings] == ["energy lost"]
     assert simulation.statistics["warnings"] == 1
+
+
+@pytest.mark.parametrize("stored, warned", [(0.4, False), (0.6, True)])
+def test_energy_from_nowhere_is_warned_of(stored: float, warned: bool):
+    # Motors give one joule, the fluid takes half of it: what is stored beyond the other half is from nowhere.
+    account = np.zeros(42)
+    account[1], account[5], account[19], account[23], account[24] = 1.0, 0.5, stored, 1.0, stored
+    found = [notice.kind for notice in notices(account, flagrs.scenarios.robot())]
+    assert found == ["energy made"] * warned
 
 
 @pytest.mark.parametrize("stretch, warned", [(0.15, False), (0.25, True)])

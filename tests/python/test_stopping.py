@@ -230,6 +230,14 @@ def test_a_function_of_time_cannot_step_its_own_simulation() -> None:
     assert held[0].time == 0.0
 
 
+@pytest.mark.parametrize("value", [None, "a", "1.5", np.nan, np.zeros(2), 1j, 10**400], ids=range(7))
+def test_a_function_of_time_that_gives_no_number_is_named(value: Any) -> None:
+    motors = [ROBOT.motors[0].replace(speed=lambda time: value if time > 0.0 else 1.0), ROBOT.motors[1]]
+    scene = ROBOT.replace(motors=motors)
+    with pytest.raises(SceneError, match="must be a finite number"):
+        Simulation(scene, threads=1).step()
+
+
 def test_copies_go_their_own_way_to_the_same_bits() -> None:
     simulation = Simulation(ROBOT, rtol=1e-3, threads=1)
     simulation.step(30)
@@ -242,6 +250,13 @@ def test_copies_go_their_own_way_to_the_same_bits() -> None:
         assert np.array_equal(other.nodes, twin.nodes) and not np.array_equal(other.nodes, there)
     with pytest.raises(FlagrsError, match="cannot be pickled"):
         pickle.dumps(simulation)
+
+
+def test_scenes_that_were_pickled_or_copied_stay_as_they_are() -> None:
+    for scene in (pickle.loads(pickle.dumps(ROBOT)), copy.deepcopy(ROBOT), copy.copy(ROBOT)):
+        assert scene == ROBOT
+        with pytest.raises(ValueError, match="read-only"):
+            scene.rods[0].nodes[0, 0] = 7.0
 
 
 BAD_STATES: dict[str, Any] = {

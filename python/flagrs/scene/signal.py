@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Annotated, Any
 
@@ -140,13 +141,13 @@ def signal_value(signal: Signal, time: float) -> float:
         return float(signal)
     value = signal(time)
     try:
-        finite = bool(np.isfinite(value))
-    except TypeError:
-        finite = False
-    if not finite:
+        number = math.nan if isinstance(value, str | bytes) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
         raise SceneError(
             f"signal {signal!r} at t = {time:g} s: gave {value!r}; must be a finite number",
             value=value,
             allowed="a finite number",
         )
-    return float(value)
+    return number
