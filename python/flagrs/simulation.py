@@ -117,7 +117,7 @@ class Simulation:
         native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
         self._exclusive = Exclusive(native, "the simulation")
         self._native = cast(_flagrs.Simulation, self._exclusive)
-        self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
+        self._settings: dict[str, Any] = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
         self._guards = Guards(scene)
         self._restored: Path | None = None
         if rtol is not None:
@@ -509,7 +509,7 @@ class Simulation:
     def __copy__(self) -> Self:
         """Return a simulation of its own at the same state, which goes on to the same bits."""
         with self._exclusive.held():
-            options: dict[str, Any] = dict(self._settings)
+            options = self._settings
             twin = type(self)(self._scene, **options)
             twin.dt = self.dt
             twin.load_state(self.state())
