@@ -11,13 +11,18 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 # What the installed package is built from; Python files are used in place.
 SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find src -name '*.rs')
 
-.PHONY: help demo test test-rust test-rust-doc test-python test-python-doc test-wheel figure wheel studies validation bench clean
+# Examples of `make fuzz`.
+EXAMPLES ?= 10000
+
+.PHONY: help demo fuzz coverage coverage-rust test test-rust test-rust-doc test-python test-python-doc test-wheel figure wheel studies validation bench clean
 .PHONY: lint lint-rust lint-python fmt clippy rustdoc ruff ruff-format mypy stubtest
 
 help:
 	@echo 'make demo        build, run the robot for 100 s of its time, leave robot.h5 and robot.png'
 	@echo 'make test        build, run all tests: Rust, Python, and the examples of the documents'
 	@echo 'make lint        formatting, lints and types of both languages'
+	@echo 'make fuzz        random scenes that no test has seen; EXAMPLES=100000 for as many, an hour or more'
+	@echo 'make coverage    lines of the Python package that its tests run; make coverage-rust those of the core'
 	@echo 'make figure      the picture of the robot in the README'
 	@echo 'make studies     the supplementary text'"'"'s studies: speed against rpm for meshes and geometries'
 	@echo 'make validation  every number and figure of docs/validation'
@@ -60,6 +65,18 @@ test-rust-doc:
 test-python: $(VENV)/equipped
 	$(BIN)/python -m pytest tests/python
 
+# New scenes every time, against the properties of tests/python/test_fuzz.py; a failing one is printed as TOML.
+fuzz: $(VENV)/equipped
+	FLAGRS_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest tests/python/test_fuzz.py
+
+# Lines of the package and of the core that their tests run; CONTRIBUTING says what the second needs.
+coverage: $(VENV)/equipped
+	$(BIN)/python -m coverage run --source=python/flagrs -m pytest tests/python
+	$(BIN)/python -m coverage report --skip-covered
+
+coverage-rust:
+	cargo llvm-cov --locked --lib --tests --summary-only
+
 test-python-doc: $(VENV)/equipped
 	$(BIN)/python -m pytest --doctest-modules python/flagrs
 
@@ -98,6 +115,7 @@ studies: $(VENV)/installed
 
 validation: $(VENV)/equipped
 	set -e; for script in docs/validation/make_*.py; do $(BIN)/python $$script; done
+	$(BIN)/flagrs validate --full --report docs/validation/report
 
 bench: $(VENV)/equipped
 	cargo bench --locked

@@ -14,8 +14,9 @@ use flagrs::elastic::stretching::Stretching;
 use flagrs::elastic::twisting::Twisting;
 use flagrs::linear::pattern::Pattern;
 use flagrs::rod::assembly::{Assembly, HingeElement, Increment, Term};
-use flagrs::rod::configuration::{Configuration, ReferenceFrames};
+use flagrs::rod::configuration::Configuration;
 use flagrs::rod::network::Network;
+use flagrs::rod::reference::ReferenceFrames;
 
 /// The elastic terms of a helix with workspace of their own: a simulation evaluates them only together.
 struct Chain {

@@ -8,18 +8,11 @@ scene = flagrs.scenarios.clamped_flagella(count=1, angular_velocity=15.0)
 simulation = flagrs.Simulation(scene)
 trajectory = simulation.run(until=0.5, save_every=0.1, path=False)
 
-fluid, radius = scene.fluid, scene.rods[0].radius_array()
 along = np.linspace(-0.05, 0.25, 61)
 across = np.linspace(-0.06, 0.06, 25)
 x, y = np.meshgrid(along, across)
-velocity = flagrs.fluid.velocity(
-    points=np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1),
-    nodes=trajectory.nodes[-1],
-    edges=simulation.edges,
-    force_density=trajectory.force_density[-1],
-    viscosity=fluid.viscosity,
-    epsilon=fluid.epsilon_array(radius),
-).reshape(*x.shape, 3)
+points = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+velocity = trajectory.flow(points).reshape(*x.shape, 3)
 
 speed = np.linalg.norm(velocity, axis=2)
 print(

@@ -7,7 +7,7 @@ scene = flagrs.scenarios.robot(rpm=20.0)
 print(scene.plan())
 
 simulation = flagrs.Simulation(scene)
-simulation.run(until=10.0, save_every=0.1, path="robot.h5")
+simulation.run(until=10.0, save_every=0.1, path="robot.h5", overwrite=True)
 
 # As another program might, on another day: the file holds scene, settings and the last state, to the bit.
 later = flagrs.Simulation.restore("robot.h5")

@@ -10,7 +10,7 @@ scene = flagrs.Scene(rods=rod, fluid=flagrs.Fluid(viscosity=0.1))
 
 
 def trap(time, nodes, velocities, directors):
-    """Pull the last node to a point that moves across; with the spring's stiffness it is followed implicitly."""
+    """Pull the last node to a point that moves across; its stiffness makes the pull implicit."""
     forces, stiffness = np.zeros_like(nodes), np.zeros((len(nodes), 3, 3))
     forces[-1] = SPRING * (rod.nodes[-1] + [0.0, 2e-3 * time, 0.0] - nodes[-1])
     stiffness[-1] = SPRING * np.eye(3)

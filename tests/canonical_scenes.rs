@@ -28,7 +28,7 @@ fn every_clamped_flagellum_has_68_nodes() {
 #[test]
 fn flagella_of_the_robot_are_28_mm_apart_and_95_mm_long_beyond_the_axis_points() {
     let scene = scenes::robot(7.0, 20.0);
-    let head = scene.head.expect("the robot has a head").node;
+    let head = scene.head.as_ref().expect("the robot has a head").node;
     let (axis_1, axis_2) = (scene.nodes[head - 3], scene.nodes[head + 3]);
     assert_eq!(axis_2 - axis_1, Vec3::new(0.0, 28e-3, 0.0));
     for tip in [scene.nodes[0], scene.nodes[58]] {
@@ -43,7 +43,7 @@ fn flagella_of_the_robot_are_28_mm_apart_and_95_mm_long_beyond_the_axis_points()
 #[test]
 fn robot_feels_the_fluid_outside_its_head_only() {
     let scene = scenes::robot(7.0, 20.0);
-    let head = scene.head.expect("the robot has a head").node;
+    let head = scene.head.as_ref().expect("the robot has a head").node;
     let immersed = &scene.fluid.as_ref().expect("the robot is in a fluid").immersed;
     let dry: Vec<usize> = (0..immersed.len()).filter(|&edge| !immersed[edge]).collect();
     assert_eq!(dry, (head - 3..head + 3).collect::<Vec<_>>());

@@ -9,7 +9,7 @@ use flagrs::dynamics::scheme::Scheme;
 use flagrs::dynamics::simulation::Simulation;
 use flagrs::dynamics::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
-    Specification,
+    LoadSpecification, Specification,
 };
 use flagrs::kinematics::clamp::Motion;
 
@@ -72,7 +72,10 @@ fn forces_have_neither_resultant_nor_torque() {
 fn a_pressed_rod_rests_on_the_other_within_the_tolerance() {
     let mut specification = crossed_rods(0.045);
     // Load on the free rod's middle edge, over the crossing.
-    specification.loads = vec![(15, Vec3::new(0.0, 0.0, -0.2)), (16, Vec3::new(0.0, 0.0, -0.2))];
+    specification.loads = vec![
+        LoadSpecification::force(15, Vec3::new(0.0, 0.0, -0.2)),
+        LoadSpecification::force(16, Vec3::new(0.0, 0.0, -0.2)),
+    ];
     let mut sim = Simulation::new(specification, Scheme::Overdamped, 5e-3, 1).unwrap();
     let mut touched = 0;
     for _ in 0..400 {
@@ -88,7 +91,10 @@ fn a_pressed_rod_rests_on_the_other_within_the_tolerance() {
 fn the_contact_force_carries_the_load() {
     let mut specification = crossed_rods(0.041);
     let load = 0.1;
-    specification.loads = vec![(15, Vec3::new(0.0, 0.0, -0.5 * load)), (16, Vec3::new(0.0, 0.0, -0.5 * load))];
+    specification.loads = vec![
+        LoadSpecification::force(15, Vec3::new(0.0, 0.0, -0.5 * load)),
+        LoadSpecification::force(16, Vec3::new(0.0, 0.0, -0.5 * load)),
+    ];
     let mut sim = Simulation::new(specification, Scheme::Overdamped, 1e-2, 1).unwrap();
     for _ in 0..2000 {
         sim.step().unwrap();
@@ -103,7 +109,10 @@ fn the_contact_force_carries_the_load() {
 #[test]
 fn without_contact_the_same_rods_pass_through_each_other() {
     let mut specification = crossed_rods(0.045);
-    specification.loads = vec![(15, Vec3::new(0.0, 0.0, -0.2)), (16, Vec3::new(0.0, 0.0, -0.2))];
+    specification.loads = vec![
+        LoadSpecification::force(15, Vec3::new(0.0, 0.0, -0.2)),
+        LoadSpecification::force(16, Vec3::new(0.0, 0.0, -0.2)),
+    ];
     specification.contact = None;
     let mut sim = Simulation::new(specification, Scheme::Overdamped, 5e-3, 1).unwrap();
     for _ in 0..400 {

@@ -132,3 +132,75 @@ fn derivatives_agree_with_differences_with_motors_turned_a_thousand_times() {
         check(specification, &mut random, 0.2, 1000.0);
     }
 }
+
+#[test]
+fn derivatives_agree_with_differences_at_any_twist() {
+    let mut random = Random::new(4);
+    for twist in [0.3, 1.0, 2.0, 3.1, 3.2, 50.0] {
+        let mut specification = branching_network(&mut random);
+        wind(&mut specification, twist);
+        // Near its natural twist a hinge twists little, and bending is not small beside it.
+        specification.natural_twist.iter_mut().for_each(|natural| *natural = Some(twist + 0.7));
+        check(specification, &mut random, 0.2, 0.0);
+    }
+}
+
+/// Turns each edge of the chain by `twist` against the one before it; branches stay.
+fn wind(specification: &mut Specification, twist: f64) {
+    for edge in 0..6 {
+        specification.theta[edge] += edge as f64 * twist;
+    }
+}
+
+/// Bending energy of a bent, naturally straight chain of round sections whose hinges are twisted by `twist`; with one edge
+/// `turned`, it runs against its hinges.
+fn bending_energy(twist: f64, turned: bool) -> f64 {
+    let mut random = Random::new(5);
+    let straight: Vec<Vec3> = (0..7).map(|k| Vec3::new(k as f64, 0.0, 0.0)).collect();
+    let mut edges = common::chain_edges(7);
+    if turned {
+        edges[2] = [3, 2];
+    }
+    let mut specification = scene(straight.clone(), edges, common::chain_hinges(7));
+    specification.nodes = straight.iter().map(|node| node + random.vector(0.8)).collect();
+    specification.directors = vec![(0, Vec3::new(0.1, 0.2, 1.0))];
+    wind(&mut specification, twist);
+    if turned {
+        specification.theta[2] *= -1.0;
+    }
+    Simulation::new(specification, Scheme::Overdamped, 1e-2, 1).unwrap().energies()[1]
+}
+
+#[test]
+fn bending_energy_of_round_sections_does_not_depend_on_twist() {
+    let untwisted = bending_energy(0.0, false);
+    assert!(untwisted > 0.1);
+    for twist in [1e-3, 0.3, 1.0, 2.0, 3.1, std::f64::consts::PI, 3.2, 6.3, 50.0, 3000.0] {
+        for turned in [false, true] {
+            let error = (bending_energy(twist, turned) / untwisted - 1.0).abs();
+            assert!(error < 1e-14, "twist {twist}: bending energy changes by {error:.1e}");
+        }
+    }
+}
+
+/// A hinge with a section that is not round and natural curvature, wherever its middle frame stands.
+#[test]
+fn curvature_is_measured_in_the_frame_halfway_through_the_twist() {
+    let bend = 0.7_f64;
+    let size = 2.0 * (0.5 * bend).tan();
+    for twist in [0.0, 0.4, 3.0, 3.3, 6.0, 9.0] {
+        let nodes = vec![Vec3::zeros(), Vec3::x(), Vec3::new(1.0 + bend.cos(), bend.sin(), 0.0)];
+        let mut specification = scene(nodes, common::chain_edges(3), common::chain_hinges(3));
+        // The binormal is z, the first edge's director too.
+        specification.directors = vec![(0, Vec3::z())];
+        specification.theta = vec![0.3, 0.3 + twist];
+        specification.bending = vec![[[2.0, 0.4], [0.4, 1.1]]];
+        specification.natural_curvature = vec![Some([0.2, -0.5])];
+        let found = Simulation::new(specification, Scheme::Overdamped, 1e-2, 1).unwrap().energies()[1];
+        // The middle frame stands at 0.3 + twist / 2 from the binormal: kappa = |kb| (m2 . b, -m1 . b).
+        let middle = 0.3 + 0.5 * twist;
+        let (d1, d2) = (-size * middle.sin() - 0.2, -size * middle.cos() + 0.5);
+        let expected = 0.5 * (2.0 * d1 * d1 + 0.8 * d1 * d2 + 1.1 * d2 * d2);
+        assert!((found / expected - 1.0).abs() < 1e-13, "twist {twist}: {found} against {expected}");
+    }
+}

@@ -11,8 +11,9 @@ use flagrs::forces::laboratory::{EdgeTorque, NodeForce};
 use flagrs::forces::magnetic::Magnetism;
 use flagrs::linear::pattern::Pattern;
 use flagrs::rod::assembly::{Assembly, Increment, Term};
-use flagrs::rod::configuration::{Configuration, ReferenceFrames};
+use flagrs::rod::configuration::Configuration;
 use flagrs::rod::network::Network;
+use flagrs::rod::reference::ReferenceFrames;
 use flagrs::{Mat3, Vec3};
 
 /// Two edges, frames of a reference shape, and degrees of freedom away from it.

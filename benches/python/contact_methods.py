@@ -12,7 +12,7 @@ import flagrs
 import numpy as np
 from clock import hold_to_one_thread
 from document import document_option, machine, publish, table
-from flagrs.contact_scales import barrier_stiffness
+from flagrs.contact_scales import contact_scales, pair_stiffness
 from numpy.typing import NDArray
 
 #: Radius of the filaments [m]; helix radius, the size that errors refer to [m].
@@ -36,7 +36,10 @@ class Measures:
 def bundle(contact: dict[str, Any], **options: Any) -> Measures:
     scene = flagrs.scenarios.clamped_flagella(count=2)
     if "stiffness" in contact:
-        usual = barrier_stiffness(scene, flagrs.Contact())
+        thickness = 2.0 * float(scene.rods[0].radius_array()[0])
+        usual = pair_stiffness(
+            contact_scales(scene), (0, 1), thickness, flagrs.Contact().tolerance_or_default()
+        )
         contact = {**contact, "stiffness": contact["stiffness"] * usual}
     scene = scene.replace(contact=flagrs.Contact(**contact))
     simulation = flagrs.Simulation(scene, threads=1, **options)

@@ -108,7 +108,12 @@ def _evaluate(
         angle = math.atan2(_dot(tf, _cross(along, df)), _dot(along, df))
         angle += 2.0 * math.pi * np.round((twists[k] - angle) / (2.0 * math.pi))
         tau = q[4 * k + 7] - q[4 * k + 3] + angle
-        chi = 1.0 + _dot(te, tf)
+        # The frame halfway through the twist, as either edge has it.
+        cosine, sine = math.cos(0.5 * tau), math.sin(0.5 * tau)
+        m1e, m2e = _sum(m1e, cosine, m2e, sine), _sum(m2e, cosine, m1e, -sine)
+        m1f, m2f = _sum(m1f, cosine, m2f, -sine), _sum(m2f, cosine, m1f, sine)
+        mid = _sum(te, 1.0, tf, 1.0)
+        chi = 0.5 * _dot(mid, mid)
         bare = _cross(te, tf)
         kb = _sum(bare, 2.0 / chi, bare, 0.0)
         mean_t = _sum(te, 1.0 / chi, tf, 1.0 / chi)
@@ -123,10 +128,8 @@ def _evaluate(
         _set(slopes[1], 4, _sum(mean_t, -kappa_2, _cross(te, mean_m1), 1.0), 1.0 / lf)
         _set(slopes[2], 0, kb, 0.5 / le)
         _set(slopes[2], 4, kb, 0.5 / lf)
-        slopes[0, 3] = -0.5 * _dot(kb, m1e)
-        slopes[0, 7] = -0.5 * _dot(kb, m1f)
-        slopes[1, 3] = -0.5 * _dot(kb, m2e)
-        slopes[1, 7] = -0.5 * _dot(kb, m2f)
+        slopes[0, 3] = slopes[0, 7] = 0.5 * kappa_2
+        slopes[1, 3] = slopes[1, 7] = -0.5 * kappa_1
         slopes[2, 3] = -1.0
         slopes[2, 7] = 1.0
 
@@ -146,8 +149,8 @@ def _evaluate(
         w1, w2, w3 = moments[0], moments[1], moments[2]
         weighted = w1 * kappa_1 + w2 * kappa_2
         mean = _sum(mean_m2, w1, mean_m1, -w2)
-        own_e, own_f = _sum(m2e, w1, m1e, -w2), _sum(m2f, w1, m1f, -w2)
-        turned_e, turned_f = _sum(m1e, w1, m2e, w2), _sum(m1f, w1, m2f, w2)
+        own_e, own_f = _sum(m2e, 0.25 * w1, m1e, -0.25 * w2), _sum(m2f, 0.25 * w1, m1f, -0.25 * w2)
+        own_e, own_f = _sum(own_e, 1.0, kb, weighted / 32.0), _sum(own_f, 1.0, kb, weighted / 32.0)
         across_e, across_f = _cross(te, mean), _cross(tf, mean)
         # The antisymmetric part of the mixed block: -skew(mean) + w3 / chi skew(te).
         spin = _sum(mean, -1.0, te, w3 / chi)
@@ -157,27 +160,25 @@ def _evaluate(
                 same = 1.0 if i == j else 0.0
                 wide = 2.0 * weighted * mean_t[i] * mean_t[j]
                 ee = wide - across_f[i] * mean_t[j] - mean_t[i] * across_f[j]
-                ee += 0.25 * (kb[i] * own_e[j] + own_e[i] * kb[j]) - (same - te[i] * te[j]) * (weighted / chi)
+                ee += kb[i] * own_e[j] + own_e[i] * kb[j] - (same - te[i] * te[j]) * (weighted / chi)
                 ee -= 0.25 * w3 * (kb[i] * (te[j] + mean_t[j]) + (te[i] + mean_t[i]) * kb[j])
                 ff = wide + across_e[i] * mean_t[j] + mean_t[i] * across_e[j]
-                ff += 0.25 * (kb[i] * own_f[j] + own_f[i] * kb[j]) - (same - tf[i] * tf[j]) * (weighted / chi)
+                ff += kb[i] * own_f[j] + own_f[i] * kb[j] - (same - tf[i] * tf[j]) * (weighted / chi)
                 ff -= 0.25 * w3 * (kb[i] * (tf[j] + mean_t[j]) + (tf[i] + mean_t[i]) * kb[j])
                 ef = wide - across_f[i] * mean_t[j] + mean_t[i] * across_e[j] + skew[i][j]
+                ef += 0.0625 * weighted * kb[i] * kb[j]
                 ef -= (same + te[i] * tf[j]) * (weighted / chi) + 0.5 * w3 * kb[i] * mean_t[j]
                 local[i, j] += ee / (le * le)
                 local[4 + i, 4 + j] += ff / (lf * lf)
                 local[i, 4 + j] += ef / (le * lf)
                 local[4 + j, i] += ef / (le * lf)
-        for angle_row, own, turned in ((3, own_e, turned_e), (7, own_f, turned_f)):
-            local[angle_row, angle_row] -= 0.5 * _dot(kb, own)
-            slope = 0.5 * _dot(kb, turned)
-            with_e = _sum(mean_t, slope / le, _cross(tf, turned), -1.0 / (chi * le))
-            with_f = _sum(mean_t, slope / lf, _cross(te, turned), 1.0 / (chi * lf))
-            for i in range(3):
-                local[i, angle_row] += with_e[i]
-                local[angle_row, i] += with_e[i]
-                local[4 + i, angle_row] += with_f[i]
-                local[angle_row, 4 + i] += with_f[i]
+        for angle in (3, 7):
+            for i in (0, 1, 2, 4, 5, 6):
+                mixed = 0.5 * (w1 * slopes[1, i] - w2 * slopes[0, i])
+                local[i, angle] += mixed
+                local[angle, i] += mixed
+            local[angle, 3] -= 0.25 * weighted
+            local[angle, 7] -= 0.25 * weighted
 
         at = 4 * k
         for i in range(3):

@@ -1,8 +1,8 @@
 """Gradient and Hessian of a chain's elastic energy in NumPy, all hinges at once.
 
-The formulas are those of docs/theory ("Strains"): Bergou et al. (2010) with mean material directors. Frames
-are transported in time from the reference; the Hessian is exact where the chain stands at its reference
-frames.
+The formulas are those of docs/theory ("Strains"), with curvature in the frame halfway through the twist.
+Frames are transported in time from the reference; the Hessian is exact where the chain stands at its
+reference frames.
 """
 
 from __future__ import annotations
@@ -124,17 +124,21 @@ def _bending_and_twisting(
     chain: Chain, t: FloatArray, m1: FloatArray, m2: FloatArray, length: FloatArray, tau: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     te, tf, length_e, length_f = t[:-1], t[1:], length[:-1, None], length[1:, None]
-    chi = 1.0 + _dot(te, tf)[:, None]
+    # The frame halfway through the twist, as either edge has it.
+    cosine, sine = np.cos(0.5 * tau)[:, None], np.sin(0.5 * tau)[:, None]
+    m1_e, m2_e = cosine * m1[:-1] + sine * m2[:-1], cosine * m2[:-1] - sine * m1[:-1]
+    m1_f, m2_f = cosine * m1[1:] - sine * m2[1:], cosine * m2[1:] + sine * m1[1:]
+    chi = 0.5 * _dot(te + tf, te + tf)[:, None]
     kb = 2.0 * _cross(te, tf) / chi
-    mean_t, mean_m1, mean_m2 = (te + tf) / chi, (m1[:-1] + m1[1:]) / chi, (m2[:-1] + m2[1:]) / chi
-    kappa_1, kappa_2 = 0.5 * _dot(kb, m2[:-1] + m2[1:]), -0.5 * _dot(kb, m1[:-1] + m1[1:])
+    mean_t, mean_m1, mean_m2 = (te + tf) / chi, (m1_e + m1_f) / chi, (m2_e + m2_f) / chi
+    kappa_1, kappa_2 = 0.5 * _dot(kb, m2_e + m2_f), -0.5 * _dot(kb, m1_e + m1_f)
 
     slopes = np.zeros((3, len(kb), 8))
     for slope, kappa, mean, sign in ((slopes[0], kappa_1, mean_m2, 1.0), (slopes[1], kappa_2, mean_m1, -1.0)):
         slope[:, 0:3] = (sign * _cross(tf, mean) - kappa[:, None] * mean_t) / length_e
         slope[:, 4:7] = (-sign * _cross(te, mean) - kappa[:, None] * mean_t) / length_f
-    for slope, m in ((slopes[0], m1), (slopes[1], m2)):
-        slope[:, 3], slope[:, 7] = -0.5 * _dot(kb, m[:-1]), -0.5 * _dot(kb, m[1:])
+    slopes[0, :, 3] = slopes[0, :, 7] = 0.5 * kappa_2
+    slopes[1, :, 3] = slopes[1, :, 7] = -0.5 * kappa_1
     slopes[2, :, 0:3], slopes[2, :, 4:7] = kb / (2.0 * length_e), kb / (2.0 * length_f)
     slopes[2, :, 3], slopes[2, :, 7] = -1.0, 1.0
 
@@ -154,25 +158,29 @@ def _bending_and_twisting(
     across_e, across_f = _cross(te, mean), _cross(tf, mean)
     chi_3, identity = chi[:, :, None], np.eye(3)
     wide = 2.0 * weighted * _outer(mean_t, mean_t)
+    with_twist = kb * (weighted[:, 0] / 32.0)
     for at, own, tangent, across, sign, edge in (
-        (0, slice(None, -1), te, across_f, -1.0, length_e),
-        (4, slice(1, None), tf, across_e, 1.0, length_f),
+        (0, m2_e * w1 - m1_e * w2, te, across_f, -1.0, length_e),
+        (4, m2_f * w1 - m1_f * w2, tf, across_e, 1.0, length_f),
     ):
-        own_m = m2[own] * w1 - m1[own] * w2
-        turned = m1[own] * w1 + m2[own] * w2
-        block = wide + sign * _symmetric(across, mean_t) + 0.25 * _symmetric(kb, own_m)
+        block = wide + sign * _symmetric(across, mean_t) + _symmetric(kb, 0.25 * own + with_twist)
         block -= (identity - _outer(tangent, tangent)) * (weighted / chi_3)
         block -= 0.25 * w3[:, :, None] * _symmetric(kb, tangent + mean_t)
         hessian[:, at : at + 3, at : at + 3] += block / (edge * edge)[:, :, None]
-        hessian[:, at + 3, at + 3] -= 0.5 * _dot(kb, own_m)
-        slope = 0.5 * _dot(kb, turned)[:, None]
-        for start, other in (
-            (0, (mean_t * slope - _cross(tf, turned) / chi) / length_e),
-            (4, (mean_t * slope + _cross(te, turned) / chi) / length_f),
-        ):
-            hessian[:, start : start + 3, at + 3] += other
-            hessian[:, at + 3, start : start + 3] += other
-    block = wide - _outer(across_f, mean_t) + _outer(mean_t, across_e) - _skew(mean)
+    column = 0.5 * (w1 * slopes[1] - w2 * slopes[0])
+    for angle in (3, 7):
+        for start in (0, 4):
+            hessian[:, start : start + 3, angle] += column[:, start : start + 3]
+            hessian[:, angle, start : start + 3] += column[:, start : start + 3]
+        hessian[:, angle, 3] += column[:, 3]
+        hessian[:, angle, 7] += column[:, 7]
+    block = (
+        wide
+        - _outer(across_f, mean_t)
+        + _outer(mean_t, across_e)
+        - _skew(mean)
+        + 2.0 * _outer(kb, with_twist)
+    )
     block -= (identity + _outer(te, tf)) * (weighted / chi_3)
     block += 0.5 * w3[:, :, None] * (_skew(te) * (2.0 / chi_3) - _outer(kb, mean_t))
     block /= (length_e * length_f)[:, :, None]

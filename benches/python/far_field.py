@@ -161,7 +161,7 @@ def step(count: int, options: Mapping[str, float]) -> tuple[FloatArray, float]:
     """Return the displacements of a step of flagella that sink [m], and how long it took [s]."""
     material = flagrs.scenarios.clamped_flagella(count=1).rods[0].material
     rods = [flagrs.Rod.from_nodes(nodes, radius=1e-3, material=material) for nodes in flagella(count)]
-    fluid = flagrs.Fluid(viscosity=0.1, epsilon=EPSILON, **options)
+    fluid = flagrs.Fluid(viscosity=0.1, epsilon=EPSILON, density=0.0, **options)
     scene = flagrs.Scene(rods=rods, fluid=fluid, gravity=(0.0, 0.0, -9.81))
     simulation = flagrs.Simulation(scene, dt=1e-3, threads=1)
     before = simulation.nodes.copy()

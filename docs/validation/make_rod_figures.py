@@ -1,7 +1,7 @@
 """Makes every number and figure of rods.md: rods, motors and schemes against closed forms and each other.
 
 Run with ``python docs/validation/make_rod_figures.py`` (five minutes on one core; needs matplotlib); names of
-parts may follow. It uses the problems of the tests, tests/python/rod_statics.py, rod_motion.py, elastica.py.
+parts may follow. It uses problems of `flagrs validate`, and tests/python/rod_statics.py and rod_motion.py.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from flagrs import Clamp, Fluid, Material, Motor, PointLoad, Rod, Scene, Simulation, scenarios
 from flagrs.plot.canvas import COLOURS, GREY, dress, legend, new_figure
+from flagrs.validation.elastica import tip_deflection
+from flagrs.validation.problems.rings import critical_twist, lowest_stiffness, michell
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
 
-from elastica import tip_deflection  # noqa: E402
 from rod_motion import (  # noqa: E402
     disturbance_grows,
     imbalance,
@@ -30,9 +31,14 @@ from rod_motion import (  # noqa: E402
 from rod_statics import (  # noqa: E402
     cantilever_compliance,
     cantilever_tip,
-    critical_twist,
-    lowest_stiffness,
-    michell,
+)
+from rod_twist import (  # noqa: E402
+    WHIRLING,
+    buckled_cosine,
+    critical_turns,
+    least_cosine,
+    whirling_modes,
+    whirling_speed,
 )
 from scipy.spatial.transform import Rotation  # noqa: E402
 
@@ -110,8 +116,26 @@ def ring() -> None:
     figure.savefig(FIGURES / "rods_ring.png", dpi=160)
 
 
-def bent_shaft(corrected: bool) -> tuple[Array, Array]:
-    """Return motor angles and bending energies [J] of a joint held bent, as coded or as in the text."""
+def twist() -> None:
+    """Rods truly twisted: Michell's ring, twirling to whirling, localized buckling."""
+    rows: list[tuple[str, tuple[int, ...], Callable[[int], float], float]] = [
+        ("ring, four turns", (12, 24, 48), lambda count: critical_turns(count, 4), 1.0),
+        ("whirling, GJ/EI = 0.2", (10, 20, 40, 80), lambda count: whirling_speed(count, 0.2), WHIRLING),
+        ("whirling, GJ/EI = 2/3", (10, 20, 40, 80), lambda count: whirling_speed(count, 2.0 / 3.0), WHIRLING),
+        ("localized buckling", (100, 200, 400, 800), least_cosine, float(buckled_cosine(np.zeros(1))[0])),
+    ]
+    for name, counts, found, exact in rows:
+        values = np.array([found(count) for count in counts])
+        errors = values - exact
+        print(f"{name}, {counts} edges: {values}, exact {exact}, relative errors {errors / exact}")
+        print(f"  errors {errors}, orders {np.log2(errors[:-1] / errors[1:])}")
+    for count in (10, 20, 40, 80):
+        modes = whirling_modes(count, whirling_speed(count, 0.2), 0.2)
+        print(f"  frequency on {count} edges: {abs(modes[np.argmax(modes.real)].imag):.4f}")
+
+
+def bent_shaft() -> tuple[Array, Array]:
+    """Return motor angles and bending energies [J] of a joint held bent."""
     nodes = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.766, 0.643, 0.0]]) * 1e-2
     rod = Rod(
         nodes=nodes,
@@ -127,8 +151,7 @@ def bent_shaft(corrected: bool) -> tuple[Array, Array]:
     for angle in angles:
         state = {name: values.copy() for name, values in start.items()}
         state["q"][simulation.dof_of_edge[1]] += angle
-        if corrected:
-            state["motor_angles"][:] = angle
+        state["motor_angles"][:] = angle
         simulation.load_state(state)
         energies.append(simulation.energy()["bending"])
     return angles, np.array(energies)
@@ -138,12 +161,12 @@ def motors() -> None:
     """The joint's stiffness against the motor's angle, and the motion of a loaded shaft."""
     figure = new_figure(4.6, 3.2)
     axes = figure.subplots()
-    for corrected, label in ((True, "shaft turned back (as coded)"), (False, "angle in the twist only")):
-        angles, energies = bent_shaft(corrected)
-        print(f"{label}: bending energy {energies.min() / energies[0]:.3e} to {energies.max() / energies[0]}")
-        axes.plot(
-            angles / (2.0 * np.pi), energies / energies[0], color=COLOURS[0 if corrected else 1], label=label
-        )
+    angles, energies = bent_shaft()
+    # The text's mean of two directors at this angle is shorter by cos(phi / 2).
+    curves = {"as coded": energies / energies[0], "as in the text": np.cos(0.5 * angles) ** 2}
+    for colour, (label, relative) in zip(COLOURS, curves.items(), strict=False):
+        print(f"{label}: bending energy {relative.min():.3e} to {relative.max()}")
+        axes.plot(angles / (2.0 * np.pi), relative, color=colour, label=label)
     dress(
         axes, "motor angle / turns", "bending energy / that at 0", "A joint bent by 40 degrees while it turns"
     )
@@ -334,7 +357,9 @@ def stability() -> None:
 def main() -> None:
     """Run everything, or the parts named on the command line."""
     FIGURES.mkdir(exist_ok=True)
-    parts = {part.__name__: part for part in (cantilever, ring, motors, invariants, stability, schemes)}
+    parts = {
+        part.__name__: part for part in (cantilever, ring, twist, motors, invariants, stability, schemes)
+    }
     for name in sys.argv[1:] or parts:
         start = time.perf_counter()
         print(f"--- {name}")

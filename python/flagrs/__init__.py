@@ -1,7 +1,15 @@
 """Soft helical filaments swimming at low Reynolds number: discrete elastic rods in Stokes flow."""
 
 from flagrs import contact, fluid, scenarios
-from flagrs.errors import ConvergenceError, FlagrsError, SceneError
+from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError
+from flagrs.guards import (
+    EnergyWarning,
+    FlagrsWarning,
+    MeshWarning,
+    ReynoldsWarning,
+    StabilityWarning,
+    StrainWarning,
+)
 from flagrs.scene import (
     Clamp,
     Contact,
@@ -19,17 +27,24 @@ from flagrs.scene import (
     Rotation,
     Scene,
     Table,
+    TimeFunction,
 )
 from flagrs.simulation import Simulation
 from flagrs.suggest import Suggestion, suggest
 from flagrs.trajectory import Trajectory
 from flagrs.units import rpm
+from flagrs.version import installed_version
+
+__version__ = installed_version()
 
 __all__ = [
     "Clamp",
     "Contact",
     "ConvergenceError",
+    "EnergyWarning",
+    "FileError",
     "FlagrsError",
+    "FlagrsWarning",
     "FlowFunction",
     "Fluid",
     "Head",
@@ -37,17 +52,23 @@ __all__ = [
     "LinearFlow",
     "MagneticField",
     "Material",
+    "MeshWarning",
     "Motor",
     "PointLoad",
     "PoiseuilleFlow",
+    "ReynoldsWarning",
     "Rod",
     "Rotation",
     "Scene",
     "SceneError",
     "Simulation",
+    "StabilityWarning",
+    "StrainWarning",
     "Suggestion",
     "Table",
+    "TimeFunction",
     "Trajectory",
+    "__version__",
     "contact",
     "fluid",
     "rpm",

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from flagrs.contact_scales import barrier_stiffness, slip_velocity
+from flagrs.contact_scales import SLIP_SHARE, contact_scales
 from flagrs.errors import SceneError, not_allowed
 from flagrs.native_loads import native_flows, native_loads, native_magnetism, native_signal, native_vector
-from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Rotation, Scene, rod_topology
+from flagrs.scene import Clamp, Contact, Fluid, Head, Motor, Rod, Rotation, Scene, rod_topology, scene_checks
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
+from flagrs.time_step import rod_size
 
 #: Excluded rest arc length over the sum of radii where a contact gives none; see docs/theory/contact.md.
 EXCLUSION_FACTOR = math.pi / 2.0
@@ -47,16 +48,35 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "twisting": np.concatenate([rod.GJ_array() for rod in rods]),
         "natural_curvature": np.concatenate([_natural_curvature(rod) for rod in rods]),
         "natural_twist": np.concatenate([_natural_twist(rod) for rod in rods]),
-        "motors": [_motor(scene, motor) for motor in scene.motors],
+        "motors": [_motor(scene, k, motor) for k, motor in enumerate(scene.motors)],
         "head": None if scene.head is None else _head(scene, scene.head),
-        "clamps": [_clamp(scene, clamp) for clamp in scene.clamps],
+        "clamps": [_clamp(scene, k, clamp) for k, clamp in enumerate(scene.clamps)],
         "loads": native_loads(scene),
         "magnetism": native_magnetism(scene),
         "flows": native_flows(scene),
         "gravity": scene.gravity.tolist(),
+        "reynolds": reynolds_per_speed(scene),
         "fluid": None if scene.fluid is None else _fluid(scene, scene.fluid),
         "contact": None if scene.contact is None else _contact(scene, scene.contact),
     }
+
+
+def reynolds_per_speed(scene: Scene) -> FloatArray:
+    """Return each node's Reynolds number over its speed (N,) [s/m], 0 for dry ones.
+
+    It is density times size over viscosity, with the size of the node's rod across its axis, the radius of a
+    helix (`flagrs.time_step.size`), or the radius of the head on the head's node.
+    """
+    fluid = scene.fluid
+    sizes = np.zeros(scene.node_count)
+    if fluid is None:
+        return sizes
+    for number, rod in enumerate(scene.rods):
+        wet = np.unique(rod.edge_array()[rod.immersed_array()])
+        sizes[scene.node_offset(number) + wet] = rod_size(rod)
+    if scene.head is not None:
+        sizes[scene.node_offset(scene.head.rod) + scene.head.node] = scene.head.radius
+    return sizes * (fluid.density_for_inertia / fluid.viscosity)
 
 
 def _theta(rod: Rod) -> FloatArray:
@@ -75,19 +95,19 @@ def _natural_twist(rod: Rod) -> FloatArray:
 
 
 def _directors(scene: Scene) -> list[tuple[int, list[float]]]:
-    given = [(scene.edge_offset(k), rod.director) for k, rod in enumerate(scene.rods)]
-    return [(edge, director.tolist()) for edge, director in given if director is not None]
+    given = [(k, rod.director) for k, rod in enumerate(scene.rods) if rod.director is not None]
+    return [(scene.edge_offset(k), director.tolist()) for k, director in given]
 
 
-def _motor(scene: Scene, motor: Motor) -> dict[str, Any]:
+def _motor(scene: Scene, position: int, motor: Motor) -> dict[str, Any]:
     rod = scene.rods[motor.rod]
     hinge, second = hinge_of_motor(rod, motor)
-    offset = sum(len(other.hinge_array()) for other in scene.rods[: motor.rod])
+    offset = scene.hinge_offset(motor.rod)
     return {
         "hinge": offset + hinge,
         "shaft_second": second,
         "by_torque": motor.drive == "torque",
-        "signal": native_signal(motor.signal),
+        "signal": native_signal(motor.signal, f"motors[{position}].{motor.drive}"),
     }
 
 
@@ -117,46 +137,35 @@ def hinge_of_motor(rod: Rod, motor: Motor) -> tuple[int, bool]:
 
 def _head(scene: Scene, head: Head) -> dict[str, Any]:
     viscosity = 0.0 if scene.fluid is None else scene.fluid.viscosity
-    before, after = head_neighbours(scene.rods[head.rod], head)
-    offset = scene.node_offset(head.rod)
+    offset = scene.edge_offset(head.rod)
     return {
-        "node": offset + head.node,
-        "neighbours": [offset + before, offset + after],
+        "node": scene.node_offset(head.rod) + head.node,
+        "edges": [offset + edge for edge in scene_checks.edges_of_head(scene, head)],
         "translation": head.C_t * 6.0 * math.pi * viscosity * head.radius,
         "rotation": head.C_r * 8.0 * math.pi * viscosity * head.radius**3,
         "mass": head.mass,
     }
 
 
-def head_neighbours(rod: Rod, head: Head) -> tuple[int, int]:
-    """Return the two nodes next to the head's node, in the order of the rod's edges."""
-    neighbours = [
-        rod_topology.far_end(rod.edge_array(), edge, head.node)
-        for edge, pair in enumerate(rod.edge_array().tolist())
-        if head.node in pair
-    ]
-    return neighbours[0], neighbours[1]
-
-
-def _clamp(scene: Scene, clamp: Clamp) -> dict[str, Any]:
-    nodes, edges = scene.node_offset(clamp.rod), scene.edge_offset(clamp.rod)
+def _clamp(scene: Scene, position: int, clamp: Clamp) -> dict[str, Any]:
+    nodes, edges, field = scene.node_offset(clamp.rod), scene.edge_offset(clamp.rod), f"clamps[{position}]"
     return {
         "nodes": [nodes + node for node in clamp.nodes],
         "edges": [edges + edge for edge in clamp.edges],
-        "angular_velocity": native_signal(clamp.angular_velocity),
+        "angular_velocity": native_signal(clamp.angular_velocity, f"{field}.angular_velocity"),
         "axes": [axis in clamp.axes for axis in "xyz"],
-        "velocity": native_vector(clamp.velocity),
-        "displacement": native_vector(clamp.displacement),
-        "turning": None if clamp.rotation is None else _turning(clamp.rotation),
+        "velocity": native_vector(clamp.velocity, f"{field}.velocity"),
+        "displacement": native_vector(clamp.displacement, f"{field}.displacement"),
+        "turning": None if clamp.rotation is None else _turning(clamp.rotation, f"{field}.rotation"),
     }
 
 
-def _turning(rotation: Rotation) -> dict[str, Any]:
+def _turning(rotation: Rotation, field: str) -> dict[str, Any]:
     return {
         "axis": rotation.axis.tolist(),
         "center": rotation.center.tolist(),
-        "rate": native_signal(rotation.rate),
-        "angle": native_signal(rotation.angle),
+        "rate": native_signal(rotation.rate, f"{field}.rate"),
+        "angle": native_signal(rotation.angle, f"{field}.angle"),
     }
 
 
@@ -168,7 +177,7 @@ def _fluid(scene: Scene, fluid: Fluid) -> dict[str, Any]:
         "viscosity": fluid.viscosity,
         "immersed": (immersed & (fluid.model != "none")).tolist(),
         "twist_drag": fluid.twist_drag,
-        "density": fluid.density,
+        "density": fluid.density_for_buoyancy,
         "far_field_error": fluid.far_field_error,
         "far_field_nodes": fluid.crossover,
         "epsilon": None if local else fluid.epsilon_array(radius),
@@ -187,7 +196,11 @@ def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
     """
     rows = []
     for rod in scene.rods:
-        contour = float(rod.rest_lengths()[rod.immersed_array()].sum())
+        immersed = rod.immersed_array()
+        if not immersed.any():
+            rows.append(np.zeros((len(immersed), 2)))  # no drag, and no length to take it from
+            continue
+        contour = float(rod.rest_lengths()[immersed].sum())
         wavelength = contour if fluid.wavelength is None else fluid.wavelength
         radius = rod.radius_array()
         if fluid.coefficients == "gray-hancock":
@@ -199,7 +212,8 @@ def resistive_coefficients(scene: Scene, fluid: Fluid) -> FloatArray:
         across = 4.0 * np.pi * fluid.viscosity / (logarithm + 0.5)
         rows.append(np.stack([along, across], axis=1))
     coefficients: FloatArray = np.concatenate(rows)
-    if not (coefficients > 0.0).all():
+    wet = np.concatenate([rod.immersed_array() for rod in scene.rods])
+    if not (coefficients[wet] > 0.0).all():
         raise SceneError(
             "fluid.wavelength: too short for the radius; resistive force theory needs slender filaments",
             field="fluid.wavelength",
@@ -215,13 +229,23 @@ def _contact(scene: Scene, contact: Contact) -> dict[str, Any]:
         if scene.head is None:
             raise not_allowed("contact.head_radius", contact.head_radius, "None in a scene without a head")
         spheres = [(scene.node_offset(scene.head.rod) + scene.head.node, contact.head_radius)]
+    scales = contact_scales(scene)
+    # One entry per body: edges in the scene's order, then spheres.
+    owner = np.repeat(np.arange(len(scene.rods)), [len(rod.edge_array()) for rod in scene.rods])
+    if spheres and scene.head is not None:
+        owner = np.append(owner, scene.head.rod)
+    slip = scales.velocity[owner] * SLIP_SHARE
     return {
         "barrier": contact.method == "barrier",
         "tolerance": contact.tolerance_or_default(),
         "max_iterations": contact.max_iterations,
-        "stiffness": barrier_stiffness(scene, contact),
+        "stiffness": contact.stiffness,
+        "driven": scales.driven[owner].tolist(),
+        "bent": scales.bent[owner].tolist(),
         "friction": contact.friction,
-        "slip_velocity": slip_velocity(scene, contact),
+        "slip_velocities": (
+            slip if contact.slip_velocity is None else np.full_like(slip, contact.slip_velocity)
+        ).tolist(),
         "spheres": spheres,
         "exclusion": EXCLUSION_FACTOR if contact.exclusion_factor is None else contact.exclusion_factor,
         "colliding": np.concatenate([rod.colliding_array() for rod in scene.rods]).tolist(),

@@ -1,4 +1,4 @@
-"""The command ``flagrs``: run scenes, draw them, repeat the studies, check the installation."""
+"""The command ``flagrs``: run scenes, draw them, repeat the studies, validate, check the installation."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from rich.console import Console
 from rich.table import Table as TextTable
 
 from flagrs import scenarios
-from flagrs.errors import FlagrsError, SceneError
+from flagrs.errors import FileError, FlagrsError, SceneError, file_error, not_allowed
 from flagrs.progress import ProgressBar
 from flagrs.runs import Run, RunSettings, measured, run_to_file
 from flagrs.scene import Scene, toml
 from flagrs.suggest import suggest
 from flagrs.trajectory import Trajectory
 from flagrs.units import rpm
+from flagrs.version import installed_version
 
 app = typer.Typer(
     help="Soft helical filaments swimming at low Reynolds number.",
@@ -31,6 +32,21 @@ app = typer.Typer(
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
 BAD_INPUT, FAILED = 2, 1
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"flagrs {installed_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    pass
 
 
 @app.command("scenarios")
@@ -74,8 +90,14 @@ def run(
     )
     for warning in described.plan().warnings:
         typer.echo(f"warning: {warning}", err=True)
-    with ProgressBar(until, described.name, hidden=not sys.stderr.isatty()) as progress:
-        done = run_to_file(described, path, settings, fresh=fresh, progress=progress)
+    if figure is not None:
+        _check_figure(figure)
+    try:
+        with ProgressBar(until, described.name, hidden=not sys.stderr.isatty()) as progress:
+            done = run_to_file(described, path, settings, fresh=fresh, progress=progress)
+    except KeyboardInterrupt:
+        _say_what_is_saved(path)
+        raise
     typer.echo(_report(done, path))
     if figure is not None:
         _draw(done.trajectory, figure)
@@ -100,7 +122,9 @@ def plot(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Image; by default FILE.png.")] = None,
 ) -> None:
     """Draw speed, head rate and shape of a run."""
-    _draw(Trajectory.load(file), output or file.with_suffix(".png"))
+    image = output or file.with_suffix(".png")
+    _check_figure(image)
+    _draw(Trajectory.load(file), image)
 
 
 @app.command()
@@ -124,20 +148,57 @@ def study(
 
     carry_out = studies.convergence if which == "convergence" else studies.geometries
     adaptive = dt is None and scheme != "explicit"
-    result = carry_out(
-        directory or Path("flagrs-runs") / which,
-        duration=duration,
-        rtol=1e-3 if rtol is None and adaptive else rtol,
-        dt=dt,
-        scheme=scheme,
-        processes=processes,
-    )
+    try:
+        result = carry_out(
+            directory or Path("flagrs-runs") / which,
+            duration=duration,
+            rtol=1e-3 if rtol is None and adaptive else rtol,
+            dt=dt,
+            scheme=scheme,
+            processes=processes,
+        )
+    except KeyboardInterrupt:
+        typer.echo("stopped; what was run is saved, and the same command goes on", err=True)
+        raise
     _print_rows(result.rows)
     typer.echo(f"{len(result.rows)} runs in {result.wall_seconds:.1f} s: {result.table}, {result.figure}")
     failed = [row for row in result.rows if row["error"]]
     for row in failed:
         typer.echo(f"failed: {row['file']}: {row['error']}", err=True)
     if failed:
+        raise typer.Exit(FAILED)
+
+
+@app.command()
+def validate(
+    full: Annotated[bool, typer.Option("--full", help="Finer meshes and longer runs: some minutes.")] = False,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", help="Name of a problem to solve; repeatable.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Folder for a report, Markdown with figures as PNG and PDF.")
+    ] = None,
+    listed: Annotated[bool, typer.Option("--list", help="Only say what problems there are.")] = False,
+) -> None:
+    """Solve problems with known answers and compare: found, expected, tolerance, order of convergence."""
+    from flagrs import validation  # the other commands do without
+    from flagrs.validation import table
+    from flagrs.validation.report import write_report
+
+    console = Console(markup=False, highlight=False)
+    console.width = max(console.width, table.WIDTH)
+    problems = validation.chosen(only or ())
+    if listed:
+        console.print(table.problem_table(problems))
+        return
+    outcomes = []
+    for problem in problems:
+        outcomes.append(validation.solve(problem, full))
+        console.print(table.text_table(outcomes[-1]))
+    typer.echo(table.summary(outcomes))
+    if report is not None:
+        typer.echo(f"saved             {write_report(report, outcomes, full)}")
+    if not all(outcome.passed for outcome in outcomes):
         raise typer.Exit(FAILED)
 
 
@@ -201,10 +262,36 @@ def _report(done: Run, path: Path) -> str:
     return "\n".join(lines)
 
 
+def _say_what_is_saved(path: Path) -> None:
+    try:
+        trajectory = Trajectory.load(path)
+    except (FlagrsError, OSError):
+        typer.echo("stopped; nothing was saved yet", err=True)
+        return
+    until = f" up to t = {trajectory.time[-1]:g} s" if len(trajectory) else ""
+    typer.echo(
+        f"stopped; {path} holds {len(trajectory)} frames{until}, and the same command goes on", err=True
+    )
+
+
+def _check_figure(path: Path) -> None:
+    """Raise SceneError, before anything runs, for an image of a kind that cannot be drawn."""
+    from matplotlib.backend_bases import FigureCanvasBase  # the other commands do without
+
+    known = FigureCanvasBase.get_supported_filetypes()
+    if path.suffix.removeprefix(".").lower() not in known:
+        raise not_allowed("figure", str(path), "a file ending in ." + ", .".join(sorted(known)))
+    if not path.parent.is_dir():
+        raise FileError(path, f"there is no folder {str(path.parent)!r}")
+
+
 def _draw(trajectory: Trajectory, path: Path) -> None:
     from flagrs import plot as figures  # the command of this name hides the module
 
-    figures.summary(trajectory).savefig(path, dpi=150)
+    try:
+        figures.summary(trajectory).savefig(path, dpi=150)
+    except OSError as error:
+        raise file_error(path, error, "cannot be written") from None
     typer.echo(f"drawn             {path}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -97,6 +98,54 @@ def shown(value: Any) -> str:
         return f"an array of shape {value.shape}"
     text = str(value) if isinstance(value, np.generic | np.ndarray) else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+class FileError(FlagrsError, OSError):
+    """A file that cannot be read or written.
+
+    Parameters
+    ----------
+    path
+        The file.
+    problem
+        What is wrong with it, in words.
+    errno
+        The system's number of the error, if it has one.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], problem: str, errno: int | None = None) -> None:
+        super().__init__(errno, problem)
+        self.filename = os.fspath(path)
+        self.problem = problem
+
+    def __str__(self) -> str:
+        """Return path and problem."""
+        return f"{printable(self.filename)}: {self.problem}"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let it travel between processes."""
+        return type(self), (self.filename, self.problem, self.errno)
+
+
+class FileMissingError(FileError, FileNotFoundError):
+    """A file that is not there."""
+
+
+class FileTakenError(FileError, FileExistsError):
+    """A file that is there already, or in use by another run, and is not replaced unasked."""
+
+
+def file_error(path: str | os.PathLike[str], error: OSError | ValueError, doing: str) -> FileError:
+    """Return an error of the system's as one of ours: which file, and what was being done."""
+    number = error.errno if isinstance(error, OSError) else None
+    kind = FileMissingError if isinstance(error, FileNotFoundError) else FileError
+    return kind(path, f"{doing}: {os.strerror(number) if number else error}", number)
+
+
+def printable(path: str) -> str:
+    """Return a path as it can be printed anywhere, shortened in its middle."""
+    text = path.encode("utf-8", "replace").decode("utf-8") if path.isprintable() else repr(path)[1:-1]
+    return text if len(text) <= 300 else f"{text[:150]}...{text[-140:]}"
 
 
 class ConvergenceError(FlagrsError, ArithmeticError):

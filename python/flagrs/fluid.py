@@ -8,6 +8,7 @@ import numpy as np
 
 from flagrs import _flagrs
 from flagrs.errors import SceneError
+from flagrs.memory import require_memory
 from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
 from flagrs.threads import thread_count
@@ -58,6 +59,12 @@ def mobility(
     """
     points, pairs, widths = _segments(nodes, edges, epsilon)
     at = points if targets is None else _vectors("targets", targets)
+    rows = len(points if at is None else at)
+    require_memory(
+        f"the mobility of {rows} targets and {len(points)} nodes",
+        72.0 * rows * len(points),
+        "FastMobility makes its products without it",
+    )
     return _flagrs.mobility(points, pairs, widths, at, thread_count(threads))
 
 

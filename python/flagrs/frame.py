@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from flagrs.budget import WIDTH
 from flagrs.errors import FlagrsError
 from flagrs.scene import Scene
 from flagrs.scene.values import FloatArray
@@ -35,6 +36,7 @@ FIELDS: dict[str, Field] = {
     "motor_torque": Field(("M",), "N m", "torques on the shafts"),
     "minimum_gap": Field((), "m", "smallest surface-to-surface distance, infinite without pairs"),
     "contacts": Field((), "1", "number of touching pairs of edges"),
+    "account": Field((WIDTH,), "1", "energies, balances and extremes so far, as flagrs.budget reads them"),
     "energy": Field((3,), "J", "stretching, bending and twisting energy"),
 }
 

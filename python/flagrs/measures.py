@@ -36,6 +36,30 @@ def slope(time: FloatArray, values: FloatArray) -> FloatArray:
     return rate
 
 
+#: Sine of the angle to an axis below which a vector's turning about it says nothing of its body's.
+NEARLY_ALONG = 0.3
+
+
+def along(axis: FloatArray, vectors: FloatArray) -> BoolArray:
+    """Return which of the vectors (T, 3) run nearly along an axis (3,)."""
+    sines = np.linalg.norm(np.cross(axis, vectors), axis=1) / np.linalg.norm(vectors, axis=1)
+    near: BoolArray = sines <= NEARLY_ALONG * np.linalg.norm(axis)
+    return near
+
+
+def spin_about(axis: FloatArray, vectors: FloatArray, theta: FloatArray) -> FloatArray:
+    """Return the angle (T,) about an axis (3,) of a body fixed to an edge, from zero [rad].
+
+    Between two frames it is the turn of the edge's tangent, that of ``vectors`` (T, 3), and the change of the
+    angle ``theta`` (T,) of its material frame: its spin, because reference frames do not spin in time.
+    """
+    unit = axis / np.linalg.norm(axis)
+    tangents = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    turned = np.cross(tangents[:-1], tangents[1:]) @ unit
+    spun = np.diff(theta) * (0.5 * (tangents[:-1] + tangents[1:]) @ unit)
+    return np.concatenate([[0.0], np.cumsum(turned + spun)])
+
+
 def angle_about(axis: FloatArray, vectors: FloatArray) -> FloatArray:
     """Return the continued angle (T,) of vectors (T, 3) about an axis (3,), right-handed and from zero [rad].
 

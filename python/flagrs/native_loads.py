@@ -17,24 +17,29 @@ from flagrs.scene import (
     Rod,
     Scene,
     Table,
+    TimeFunction,
     VectorSignal,
 )
 from flagrs.scene.flow import Flow
-from flagrs.scene.signal import Signal
+from flagrs.scene.signal import RESOLUTION, Signal
 from flagrs.scene.values import FloatArray
 from flagrs.scene.vector_signal import components, is_zero, vector_at
 
 
-def native_signal(signal: Signal) -> Any:
-    """Return a number, a pair of arrays (times, values), or a function, as the core takes a signal."""
+def native_signal(signal: Signal, field: str) -> Any:
+    """Return a number, samples (times, values), or a function with its breaks, resolution and field."""
     if isinstance(signal, Table):
         return np.array(signal.times), np.array(signal.values)
-    return signal
+    if isinstance(signal, TimeFunction):
+        return signal.function, np.array(signal.breaks), signal.resolution, field
+    if callable(signal):
+        return signal, np.zeros(0), RESOLUTION, field
+    return float(signal)
 
 
-def native_vector(signal: VectorSignal) -> list[Any]:
+def native_vector(signal: VectorSignal, field: str) -> list[Any]:
     """Return a vector signal as three signals of the core."""
-    return [native_signal(component) for component in components(signal)]
+    return [native_signal(component, field) for component in components(signal)]
 
 
 def native_loads(scene: Scene) -> list[dict[str, Any]]:
@@ -45,7 +50,14 @@ def native_loads(scene: Scene) -> list[dict[str, Any]]:
         for kind, signal, where in place:
             if not is_zero(signal):
                 material = load.frame == "material"
-                found.append({"kind": kind, "material": material, "signal": native_vector(signal), **where})
+                found.append(
+                    {
+                        "kind": kind,
+                        "material": material,
+                        "signal": native_vector(signal, f"loads[{position}]"),
+                        **where,
+                    }
+                )
     return found
 
 
@@ -93,7 +105,11 @@ def native_magnetism(scene: Scene) -> dict[str, Any] | None:
     ]
     if field is None or not moments:
         return None
-    return {"moments": moments, "field": native_vector(field.field), "gradient": field.gradient.tolist()}
+    return {
+        "moments": moments,
+        "field": native_vector(field.field, "magnetic_field.field"),
+        "gradient": field.gradient.tolist(),
+    }
 
 
 def moments_of(rod: Rod) -> FloatArray:
@@ -105,16 +121,17 @@ def moments_of(rod: Rod) -> FloatArray:
 
 def native_flows(scene: Scene) -> list[dict[str, Any]]:
     """Return the background flows."""
-    return [] if scene.fluid is None else [_flow(flow) for flow in scene.fluid.background]
+    flows = () if scene.fluid is None else scene.fluid.background
+    return [_flow(flow, f"fluid.background[{position}]") for position, flow in enumerate(flows)]
 
 
-def _flow(flow: Flow) -> dict[str, Any]:
+def _flow(flow: Flow, field: str) -> dict[str, Any]:
     if isinstance(flow, LinearFlow):
         return {
             "kind": "linear",
-            "velocity": native_vector(flow.velocity),
+            "velocity": native_vector(flow.velocity, f"{field}.velocity"),
             "gradient": flow.gradient.tolist(),
-            "strength": native_signal(flow.strength),
+            "strength": native_signal(flow.strength, f"{field}.strength"),
             "center": flow.center.tolist(),
         }
     if isinstance(flow, PoiseuilleFlow):
@@ -124,7 +141,7 @@ def _flow(flow: Flow) -> dict[str, Any]:
             "normal": None if flow.normal is None else flow.normal.tolist(),
             "center": flow.center.tolist(),
             "radius": flow.radius,
-            "speed": native_signal(flow.speed),
+            "speed": native_signal(flow.speed, f"{field}.speed"),
         }
     return {"kind": "function", "function": flow.function, "reach": flow.reach}
 

@@ -2,10 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
 
 from tqdm.auto import tqdm
+
+from flagrs.errors import not_allowed
+
+
+@contextmanager
+def bar_for(
+    progress: Callable[[float], None] | bool | None, until: float, title: str
+) -> Iterator[Callable[[float], None] | None]:
+    """Give what reports progress: a function as it is, a bar for True, nothing for False and None."""
+    if progress is True:
+        with ProgressBar(until, title) as bar:
+            yield bar
+    elif progress is None or progress is False:
+        yield None
+    elif callable(progress):
+        yield progress
+    else:
+        raise not_allowed("progress", progress, "True, False, None or a function of the simulated time")
 
 
 class ProgressBar:

@@ -15,12 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from flagrs import trajectory_file
-from flagrs.errors import FlagrsError
+from flagrs.errors import FileError, FlagrsError
+from flagrs.files import Lock
 from flagrs.frame import checked, shapes_of
 from flagrs.scene import Scene, codec
 from flagrs.scene.values import FloatArray
 from flagrs.trajectory import Trajectory, recorded_scene, trajectory_from
-from flagrs.trajectory_file import Contents, State, TrajectoryWriter
+from flagrs.trajectory_file import Contents, State
+from flagrs.trajectory_writer import TrajectoryWriter
 from flagrs.version import installed_version
 
 #: Frames waiting in memory are written when they fill this many, or are this old [s].
@@ -53,14 +55,28 @@ class Recorder:
     Parameters
     ----------
     path
-        HDF5 file to write, replacing one that is there; None keeps everything in memory.
+        HDF5 file to write; None keeps everything in memory.
     scene
         The scene that runs. Signals that are Python functions are sampled at every frame.
     settings
         How it runs: anything JSON can hold.
+    overwrite
+        Whether a file that is there already is replaced.
+
+    Raises
+    ------
+    FileError
+        If the file is there already and is not to be overwritten, belongs to another run, or cannot be
+        written.
     """
 
-    def __init__(self, path: str | Path | None, scene: Scene, settings: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        path: str | Path | None,
+        scene: Scene,
+        settings: Mapping[str, Any],
+        overwrite: bool = False,
+    ) -> None:
         manifest = {
             "version": installed_version(),
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -70,7 +86,10 @@ class Recorder:
         frames = {name: np.zeros((0, *shape)) for name, shape in shapes_of(scene).items()}
         sampled = codec.sampled_functions_of(scene)
         signals = {name: codec.empty_samples(function) for name, function in sampled.items()}
-        self._start(path, scene, Contents(manifest, frames, signals))
+        contents = Contents(manifest, frames, signals)
+        file = None if path is None else Path(path)
+        self._start(scene, contents, file)
+        self._writer = None if file is None else TrajectoryWriter(file, contents, overwrite)
 
     @classmethod
     def resume(cls, path: str | Path, scene: Scene | None = None) -> Self:
@@ -83,28 +102,37 @@ class Recorder:
         scene
             The scene of the run; needed only if Python functions drive it, which no file can hold.
         """
-        contents = trajectory_file.read(Path(path))
-        resumed_scene = _scene_to_resume(contents, scene, path)
-        count = contents.state_frames
-        contents.frames = {name: array[:count] for name, array in contents.frames.items()}
-        contents.signals = {name: array[:count] for name, array in contents.signals.items()}
-        contents.finished = False
-        recorder = cls.__new__(cls)
-        recorder._start(path, resumed_scene, contents)
+        path = Path(path)
+        if path.is_symlink():
+            raise FileError(path, "is a link, which no result replaces; give the path it leads to")
+        # Locked before it is read: nobody may write to it in between.
+        lock = Lock(path)
+        try:
+            contents = trajectory_file.read(path)
+            resumed_scene = _scene_to_resume(contents, scene, path)
+            count = contents.state_frames
+            contents.frames = {name: array[:count] for name, array in contents.frames.items()}
+            contents.signals = {name: array[:count] for name, array in contents.signals.items()}
+            contents.finished = False
+            recorder = cls.__new__(cls)
+            recorder._start(resumed_scene, contents, path)
+            recorder._writer = TrajectoryWriter(path, contents, lock=lock)
+        finally:
+            lock.release()
         return recorder
 
-    def _start(self, path: str | Path | None, scene: Scene, contents: Contents) -> None:
-        self.path = None if path is None else Path(path)
+    def _start(self, scene: Scene, contents: Contents, path: Path | None) -> None:
+        self.path = path
         self.scene = scene
         self._contents = contents
         self._shapes = shapes_of(scene)
         self._functions = codec.sampled_functions_of(scene)
         self._waiting: list[tuple[dict[str, FloatArray], dict[str, FloatArray]]] = []
         self._waiting_since = time.perf_counter()
+        self._began = self._waiting_since - contents.wall_seconds
         times = contents.frames["time"]
         self._last_time = float(times[-1]) if len(times) else -np.inf
         self._count = len(times)
-        self._writer = None if self.path is None else TrajectoryWriter(self.path, contents)
 
     @property
     def frame_count(self) -> int:
@@ -169,9 +197,14 @@ class Recorder:
 
     def close(self, finished: bool = True) -> None:
         """Write what is waiting and close the file; `finished` marks a run that reached its end."""
-        self.flush()
-        if self._writer is not None:
-            self._writer.close(finished)
+        try:
+            self.flush()
+        finally:
+            if self._writer is not None:
+                self._writer.close(finished)
+            else:
+                self._contents.finished = finished
+                self._contents.wall_seconds = time.perf_counter() - self._began
 
     def trajectory(self) -> Trajectory:
         """Return what was recorded."""

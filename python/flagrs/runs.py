@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from flagrs.errors import FlagrsError
+from flagrs.files import check_output
 from flagrs.scene import Scene
 from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds
@@ -98,9 +99,11 @@ def run_to_file(
     Raises
     ------
     FlagrsError
-        If the file holds a run of another scene or with other settings.
+        If the file holds a run of another scene or with other settings, is being written by another run, or
+        cannot be read or written.
     """
-    existing = None if fresh or not path.exists() else _existing(scene, path, settings)
+    present = check_output(path, overwrite=True)
+    existing = _existing(scene, path, settings) if present and not fresh else None
     if existing is not None and _reached(existing, settings.until):
         return Run(existing, skipped=True)
     if existing is not None and existing.has_checkpoint:
@@ -109,7 +112,10 @@ def run_to_file(
     else:
         simulation = Simulation(scene, settings.scheme, settings.dt, settings.rtol, threads=settings.threads)
         resumed_at = None
-    trajectory = simulation.run(settings.until, settings.save_every, path=path, progress=progress)
+    # What is there is a run of the same scene that had no checkpoint yet, or was asked to be replaced.
+    trajectory = simulation.run(
+        settings.until, settings.save_every, path=path, progress=progress, overwrite=present
+    )
     return Run(trajectory, resumed_at)
 
 

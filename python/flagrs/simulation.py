@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, Never, Self, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -14,8 +15,17 @@ import scipy.sparse
 
 from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
-from flagrs.errors import FlagrsError, SceneError, not_allowed
+from flagrs.budget import statistics_of
+from flagrs.default_step import default_step
+from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
+from flagrs.exclusive import Exclusive
+from flagrs.files import same_file
+from flagrs.flow import flow_of, immersed_edges
+from flagrs.frame_times import check_frames, frame_times
+from flagrs.guards import Guards, Notice, StabilityWarning
+from flagrs.memory import require_memory
 from flagrs.outside_force import ForceFunction, OutsideForce
+from flagrs.progress import bar_for
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
 from flagrs.scene.scene import check_scene
@@ -23,11 +33,9 @@ from flagrs.scene.shapes import number, whole
 from flagrs.scene.values import Bounds, FloatArray, IntArray
 from flagrs.threads import thread_count
 from flagrs.time_step import (
-    LOCAL_SHARE,
     STABLE_SHARE,
-    default_step,
     explicit_limit,
-    size,
+    local_tolerance,
 )
 from flagrs.trajectory import Trajectory
 
@@ -56,12 +64,14 @@ class Simulation:
         the same with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
-        Length of a step [s]. None: a turn of 0.05 rad of the fastest motor; a fifth of the stability limit
-        for the explicit scheme.
+        Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
+        motor or less where filaments relax faster; a fifth of the stability limit for the explicit scheme,
+        which warns (`flagrs.StabilityWarning`) of longer ones than that limit.
     rtol
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
-        of node positions, relative to the size of the filaments (`flagrs.time_step.size`). None: steps of
-        `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first step.
+        of node positions, relative to the size of the filament they are on (docs/theory/time.md). None:
+        steps of `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first
+        step.
     force
         A function that gives forces from outside, called once at the beginning of every step with the time
         [s], nodes (N, 3) [m], velocities (N, 3) [m/s] and directors (E, 3, 3), rows ``m1, m2, t``. It returns
@@ -96,6 +106,11 @@ class Simulation:
         threads: int | None = None,
     ) -> None:
         check_scene(scene)
+        require_memory(
+            f"a simulation of {scene.node_count} nodes",
+            scene.plan().memory,
+            "take longer edges, or leave Fluid.far_field_nodes as it is",
+        )
         if rtol is not None:
             number("rtol", rtol, Bounds("1", at_least=1e-8, at_most=0.1))
         if rtol is not None and scheme == "explicit":
@@ -108,16 +123,25 @@ class Simulation:
         step = default_step(scene) if dt is None else number("dt", dt, Bounds("s", above=0.0))
         _check_scheme(scene, scheme)
         self._scene = scene
-        self._native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
-        recorded = None if force is None else repr(force)
-        self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads, "force": recorded}
+        native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
+        self._exclusive = Exclusive(native, "the simulation")
+        self._native = cast(_flagrs.Simulation, self._exclusive)
+        self._settings: dict[str, Any] = {
+            "scheme": scheme,
+            "dt": dt,
+            "rtol": rtol,
+            "threads": threads,
+            "force": None if force is None else repr(force),
+        }
+        self._guards = Guards(scene)
         self._restored: Path | None = None
         if force is not None:
             self._native.set_force(OutsideForce(force, scene.node_count, scene.edge_count))
         if rtol is not None:
-            self._native.set_tolerance(LOCAL_SHARE * rtol * size(scene))
+            self._native.set_tolerance(local_tolerance(scene, rtol))
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
+        self._check_stability()
 
     @classmethod
     def restore(
@@ -144,7 +168,10 @@ class Simulation:
         if (recorded is None) != (force is None):
             told = "had no force function" if recorded is None else f"had the force function {recorded}"
             raise FlagrsError(f"{path}: the run {told}; give force= just as it was")
-        simulation = cls(saved.scene, **saved.settings, force=force)
+        try:
+            simulation = cls(saved.scene, **saved.settings, force=force)
+        except TypeError as error:
+            raise FileError(path, f"damaged: its settings ({error})") from None
         simulation.load_state(saved.state)
         simulation._restored = Path(path)
         return simulation
@@ -167,6 +194,7 @@ class Simulation:
     @dt.setter
     def dt(self, value: float) -> None:
         self._native.dt = number("dt", value, Bounds("s", above=0.0))
+        self._check_stability()
 
     @property
     def time(self) -> float:
@@ -182,6 +210,29 @@ class Simulation:
     def edges(self) -> IntArray:
         """Start and end node (E, 2) of the edges."""
         return edges_of(self._scene)
+
+    @property
+    def immersed_edges(self) -> IntArray:
+        """Start and end node (W, 2) of the edges in the fluid: those that go with a force density."""
+        return immersed_edges(self._scene)[0]
+
+    def flow(self, points: Any) -> FloatArray:
+        """Return the velocity (M, 3) of the fluid at points (M, 3) [m], driven by the immersed edges [m/s].
+
+        Raises
+        ------
+        FlagrsError
+            If the fluid is not of regularized Stokeslet segments.
+        SceneError
+            For points of the wrong shape.
+        """
+        threads = self._settings["threads"]
+        return flow_of(self._scene, self.nodes, self.frame()["force_density"], points, threads)
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What has been warned of so far, with the worst value of each kind."""
+        return self._guards.found
 
     @property
     def theta(self) -> FloatArray:
@@ -215,8 +266,15 @@ class Simulation:
 
     @property
     def statistics(self) -> dict[str, float]:
-        """Counts of steps, rejected steps, Newton, Krylov and contact iterations, and seconds by part."""
-        return self._native.statistics()
+        """Counts of steps, rejected steps, Newton, Krylov and contact iterations, seconds, and balances.
+
+        ``energy_given``, ``energy_taken`` and ``energy_stored`` [J] are sums since the start,
+        ``energy_defect`` what is left of them over the energy that has passed; ``force_imbalance`` and
+        ``torque_imbalance`` are the largest outer force and torque left over on a free part, relative to the
+        sums of their sizes; ``warnings`` is how many kinds there were.
+        """
+        numbers = statistics_of(self._native.account())
+        return self._native.statistics() | numbers | {"warnings": len(self._guards.found)}
 
     def step(self, n: int = 1) -> None:
         """Make n steps of `dt`.
@@ -232,13 +290,15 @@ class Simulation:
             If n is not a whole number, at least 0, or a motor's function gives anything but a finite number.
         """
         self._native.step(min(whole("n", n, least=0), MOST_STEPS))
+        self._guards.look(self._native.account())
 
     def run(
         self,
         until: float,
         save_every: float,
         path: str | Path | Literal[False] | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] | bool | None = None,
+        overwrite: bool = False,
     ) -> Trajectory:
         """Run until a time and return what was recorded.
 
@@ -252,33 +312,56 @@ class Simulation:
         save_every
             Simulated time between frames [s].
         path
-            HDF5 file. None: a new file in ``flagrs-runs/``; False: nothing is saved.
+            HDF5 file. None: a new file in ``flagrs-runs/``; False: nothing is saved. The file a simulation
+            was restored from is gone on with.
         progress
-            Called with the simulated time [s] after every frame.
+            Called with the simulated time [s] after every frame; True: a progress bar.
+        overwrite
+            Whether a file that is there already is replaced.
 
         Raises
         ------
         ConvergenceError
             As `step`; frames up to there are saved.
         SceneError
-            If a time is out of range.
+            If a time is out of range, or the frames would take more memory than there is.
+        FileError
+            If the file is there already, is written by another run, or cannot be written; an `OSError`.
         """
+        with self._exclusive.held(), bar_for(progress, until, self._scene.name) as report:
+            return self._run(until, save_every, path, report, overwrite)
+
+    def _run(
+        self,
+        until: float,
+        save_every: float,
+        path: str | Path | Literal[False] | None,
+        progress: Callable[[float], None] | None,
+        overwrite: bool,
+    ) -> Trajectory:
         end = number("until", until, Bounds("s", above=self.time))
         every = number("save_every", save_every, Bounds("s", above=0.0))
+        check_frames(self._scene, self.time, end, every)
         target = self._path(path)
-        again = target is not None and target == self._restored
-        recorder = Recorder.resume(target, self._scene) if again and target else self._recorder(target)
+        again = target is not None and same_file(target, self._restored)
+        if again and target is not None:
+            recorder = Recorder.resume(target, self._scene)
+        else:
+            recorder = self._recorder(target, overwrite)
         with recorder:
             if not again:
                 recorder.append(self.frame())
             start = recorder.last_time if again else self.time
-            for time in _frame_times(start, end, every):
+            for time in frame_times(start, end, every):
                 recorder.append(self._frame_at(time, end))
+                self._guards.look(self._native.account())
                 if recorder.frame_count % CHECKPOINT_FRAMES == 0:
                     recorder.checkpoint(self.state())
+                    self._check_stability()
                 if progress is not None:
                     progress(time)
             recorder.checkpoint(self.state())
+            self._guards.look(self._native.account(), end=True)
         return recorder.trajectory()
 
     def _path(self, path: str | Path | Literal[False] | None) -> Path | None:
@@ -291,8 +374,8 @@ class Simulation:
         names = (f"{stamp}{'' if k == 0 else f'-{k}'}.h5" for k in range(10_000))
         return next(RUNS_FOLDER / name for name in names if not (RUNS_FOLDER / name).exists())
 
-    def _recorder(self, path: Path | None) -> Recorder:
-        return Recorder(path, self._scene, self._settings)
+    def _recorder(self, path: Path | None, overwrite: bool) -> Recorder:
+        return Recorder(path, self._scene, self._settings, overwrite=overwrite)
 
     def _frame_at(self, time: float, end: float) -> dict[str, Any]:
         """Return the frame at a time, reached by fixed steps or interpolated between adaptive ones."""
@@ -359,12 +442,33 @@ class Simulation:
         ``resistance() @ velocities.ravel()`` is the force that drags the nodes at these velocities; twist
         drag and head are not in it.
         """
+        require_memory(
+            f"the resistance of {self._scene.node_count} nodes",
+            3 * 72.0 * self._scene.node_count**2,
+            "there is no smaller form of it; simulations of large scenes never form it",
+        )
         return self._native.resistance()
 
     def stable_step(self) -> float:
         """Return the longest stable step of the explicit scheme [s]: 2 / lambda_max(M^-1 Res)."""
         rows = (self.dof_of_node[:, None] + np.arange(3)).ravel()
         return explicit_limit(self.resistance(), self.mass[rows])
+
+    def _check_stability(self) -> None:
+        """Warn of steps of the explicit scheme that are longer than its limit at the present shape."""
+        if self.scheme != "explicit":
+            return
+        try:
+            limit = self.stable_step()
+        except FlagrsError:  # too many nodes for a resistance: the limit cannot be known
+            return
+        if self.dt > limit:
+            warnings.warn(
+                f"dt: {self.dt:g} s is above the explicit scheme's stability limit, {limit:g} s: unless "
+                "elasticity raises it, the motion is wrong; take a smaller dt, or scheme='implicit'",
+                StabilityWarning,
+                stacklevel=3,
+            )
 
     @property
     def minimum_gap(self) -> float:
@@ -400,27 +504,65 @@ class Simulation:
         SceneError
             If it does not belong to this scene, or is not finite.
         """
-        missing = self._native.state().keys() - state.keys()
+        present = self._native.state()
+        if not isinstance(state, Mapping):
+            raise not_allowed("state", state, "what state() returned")
+        missing = present.keys() - state.keys()
         if missing:
             raise not_allowed("state", f"without {', '.join(sorted(missing))}", "what state() returned")
-        self._native.load_state(state)
+        self._native.load_state({name: _part(name, state[name], like) for name, like in present.items()})
 
-    def checkpoint(self, path: str | Path) -> None:
-        """Write the present state to a file that `restore` reads."""
-        with self._recorder(Path(path)) as recorder:
+    def checkpoint(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write the present state to a file that `restore` reads.
+
+        Parameters
+        ----------
+        path
+            The file.
+        overwrite
+            Whether one that is there already is replaced.
+
+        Raises
+        ------
+        FileError
+            If it is there already, is written by a run, or cannot be written; an `OSError`.
+        """
+        with self._exclusive.held(), self._recorder(Path(path), overwrite) as recorder:
             recorder.append(self.frame())
             recorder.checkpoint(self.state())
+
+    def __copy__(self) -> Self:
+        """Return a simulation of its own at the same state, which goes on to the same bits."""
+        with self._exclusive.held():
+            options = self._settings
+            twin = type(self)(self._scene, **options)
+            twin.dt = self.dt
+            twin.load_state(self.state())
+        return twin
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """As `copy.copy`: scenes cannot change, and need no copies."""
+        return self.__copy__()
+
+    def __reduce__(self) -> Never:
+        """Refuse to be pickled."""
+        raise FlagrsError(
+            "a simulation cannot be pickled; pickle its scene and its state(), and give them to Simulation "
+            "and load_state, or use checkpoint and restore"
+        )
 
     def __repr__(self) -> str:
         """Describe the simulation in a line."""
         return f"<flagrs.Simulation of {self._scene.name!r}: {self._native!r}>"
 
 
-def _frame_times(start: float, end: float, every: float) -> list[float]:
-    """Return the times of frames after the start: multiples of the interval, and the end."""
-    first = math.floor(start / every * (1.0 + 1e-12) + 1e-9) + 1
-    last = math.ceil(end / every - 1e-9)
-    return [min(k * every, end) for k in range(first, last + 1)]
+def _part(name: str, value: Any, like: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return an array of a state as the core takes it."""
+    array = np.asarray(value)
+    if array.dtype != like.dtype or array.ndim != like.ndim:
+        found = f"{array.ndim}-dimensional {array.dtype}"
+        raise not_allowed(f"state.{name}", found, f"{like.ndim}-dimensional {like.dtype}")
+    return array
 
 
 def _array(field: str, value: Any, dimensions: int) -> FloatArray:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
+import signal
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from contextlib import ExitStack
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from tqdm.auto import tqdm
 
-from flagrs.errors import FlagrsError
+from flagrs import worker
 from flagrs.processors import usable_processors
 from flagrs.runs import RunSettings, measured, run_to_file
 from flagrs.scene import Scene
@@ -106,6 +107,9 @@ def run(
     progress
         Whether to show a progress bar.
 
+    Ending the iteration early, as Ctrl-C does, stops the workers within a second or two: no new case begins,
+    and what was running is saved and goes on in the next sweep.
+
     Raises
     ------
     SceneError
@@ -116,22 +120,57 @@ def run(
     jobs = {case.key(): (case, case.path_in(directory)) for case in cases}
     with ExitStack() as stack:
         if executor is None:
-            # Spawned, not forked: a forked child inherits the locks of threads it does not have.
-            workers = processes or usable_processors()
-            pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
-            stack.callback(pool.shutdown, cancel_futures=True)
-            executor = pool
-        futures = [executor.submit(_run_case, case, path) for case, path in jobs.values()]
+            executor = stack.enter_context(_workers(processes or usable_processors()))
+        with _without_interrupts():
+            futures = {executor.submit(_run_case, case, path): (case, path) for case, path in jobs.values()}
+        stack.callback(_cancel, futures)
         bar = stack.enter_context(tqdm(total=len(futures), unit="run", disable=not progress))
         for future in as_completed(futures):
             bar.update()
-            yield future.result()
+            try:
+                result = future.result()
+            except BrokenExecutor as error:
+                result = Result(*futures[future], {}, 0.0, error=f"the worker process died: {error}")
+            yield result
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[Executor]:
+    """Give worker processes, which end with the context: at once if work is left, as after Ctrl-C."""
+    # Spawned, not forked: a forked child inherits the locks of threads it does not have.
+    context = multiprocessing.get_context("spawn")
+    end, line = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=worker.start, initargs=(end,))
+    try:
+        yield pool
+    finally:
+        line.close()
+        try:
+            pool.shutdown(cancel_futures=True)
+        finally:
+            end.close()
+
+
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Hold Ctrl-C back while workers start: they inherit that, the parent gets it afterwards."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _cancel(futures: Iterable[Future[Result]]) -> None:
+    for future in futures:
+        future.cancel()
 
 
 def _run_case(case: Case, path: Path) -> Result:
     started = time.perf_counter()
+    worker.check_not_stopping()
     try:
         done = run_to_file(case.scene, path, replace(case.settings, threads=1))
-    except FlagrsError as error:
+    except Exception as error:  # whatever it was, the other cases go on
         return Result(case, path, {}, time.perf_counter() - started, error=f"{type(error).__name__}: {error}")
     return Result(case, path, measured(done.trajectory), done.trajectory.wall_seconds, skipped=done.skipped)

@@ -1,11 +1,13 @@
-"""The step a simulation takes when none is asked for."""
+"""Sizes and rates of a scene that steps are measured by, and the explicit scheme's limit."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from flagrs.errors import SceneError
 from flagrs.scene import Rod, Scene
-from flagrs.scene.signal import Signal, Table
+from flagrs.scene.flow import Flow, LinearFlow, PoiseuilleFlow
+from flagrs.scene.signal import Signal, Table, signal_value
 from flagrs.scene.values import FloatArray
 
 #: Turn of the fastest motor or clamp in a step [rad]: speed and head rate of the robot at 20 rpm are then
@@ -16,8 +18,21 @@ TURN_PER_STEP = 0.05
 STABLE_SHARE = 0.2
 
 
+#: Fractional part of the golden section, whose multiples are spread most evenly.
+GOLDEN = 0.6180339887498949
+
 #: Local error of a step over the relative error asked for (measured: docs/performance.md, "rtol holds").
 LOCAL_SHARE = 0.2
+
+
+#: Largest local error of a step, in edges: a larger one turns edges by more than their frames and drag allow.
+EDGE_SHARE = 7e-3
+
+
+def local_tolerance(scene: Scene, rtol: float) -> float:
+    """Return the local error that steps may have, relative to each filament's size, and an edge's at most."""
+    edges = min(float(np.median(rod.rest_lengths())) / rod_size(rod) for rod in scene.rods)
+    return min(LOCAL_SHARE * rtol, EDGE_SHARE * edges)
 
 
 def size(scene: Scene) -> float:
@@ -26,59 +41,65 @@ def size(scene: Scene) -> float:
     The largest over the rods of the root mean square distance of the rest shape from its principal axis, the
     helix radius of a flagellum; for rods straighter than that, a twentieth of the length.
     """
-    return max(_size_of(rod) for rod in scene.rods)
+    return max(rod_size(rod) for rod in scene.rods)
 
 
-def _size_of(rod: Rod) -> float:
+def rod_size(rod: Rod) -> float:
+    """Return the size of one rod across its axis [m], as `size` takes it."""
     nodes = rod.rest_array()
     spread = np.linalg.svd(nodes - nodes.mean(axis=0), compute_uv=False)
     across = float(np.sqrt((spread[1:] ** 2).sum() / len(nodes)))
     return max(across, float(rod.rest_lengths().sum()) / 20.0)
 
 
-def fastest_rate(scene: Scene) -> float:
-    """Return the largest prescribed angular speed [rad/s]; 0 if nothing turns as prescribed."""
+def prescribed_rotations(scene: Scene) -> list[Signal]:
+    """Return the angular speeds of motors and clamps [rad/s]."""
     signals: list[Signal] = [motor.speed for motor in scene.motors if motor.speed is not None]
-    signals += [signal for clamp in scene.clamps for signal in clamp.turning_signals()]
-    return max((_largest(signal) for signal in signals), default=0.0)
+    return signals + [signal for clamp in scene.clamps for signal in clamp.turning_signals()]
 
 
-def _largest(signal: Signal) -> float:
+def fastest_rate(scene: Scene) -> float:
+    """Return the largest prescribed angular speed or rate of a background flow [rad/s]; 0 without any."""
+    turned = [largest(signal) for signal in prescribed_rotations(scene)]
+    flows = () if scene.fluid is None else scene.fluid.background
+    return max([*turned, *map(_flow_rate, flows)], default=0.0)
+
+
+def _flow_rate(flow: Flow) -> float:
+    """Return the largest rate at which a flow strains or turns what is in it [1/s]."""
+    if isinstance(flow, LinearFlow):
+        return float(np.linalg.norm(flow.gradient)) * largest(flow.strength)
+    if isinstance(flow, PoiseuilleFlow):
+        return 2.0 * largest(flow.speed) / flow.radius
+    return 0.0
+
+
+def samples() -> tuple[FloatArray, float]:
+    """Return the times at which functions of time are looked at [s], and how much later once more [s].
+
+    They are spread evenly over ten seconds, and over the decades below, at distances that are no multiples of
+    a period.
+    """
+    even = 10.0 * ((np.arange(1, 201) * GOLDEN) % 1.0)
+    decades = 10.0 ** (1.0 - 7.0 * ((np.arange(1, 101) * GOLDEN) % 1.0))
+    return np.sort(np.concatenate([even, decades])), 1e-6
+
+
+def _sample(signal: Signal, time: float) -> float:
+    """Return a signal's value [rad/s]; 0 where it has none, which the run may never reach."""
+    try:
+        return signal_value(signal, time)
+    except SceneError:
+        return 0.0
+
+
+def largest(signal: Signal) -> float:
+    """Return the largest magnitude of a signal, of a function of time over the first ten seconds."""
     if isinstance(signal, Table):
         return float(np.abs(signal.values).max())
     if callable(signal):
-        return max(abs(float(signal(time))) for time in np.linspace(0.0, 10.0, 101))
+        return max(abs(_sample(signal, float(time))) for time in samples()[0])
     return abs(float(signal))
-
-
-def relaxation_time(scene: Scene) -> float:
-    """Return the slowest bending relaxation time of a free rod [s].
-
-    Drag over bending, zeta L^4 / (4.73^4 EI), with 4.73 the first root of cos(k) cosh(k) = 1. Without a
-    fluid it is the period of the slowest bending vibration, 2 pi sqrt(rho A L^4 / EI) / 4.73^2.
-    """
-    times = []
-    for rod in scene.rods:
-        length = float(rod.rest_lengths().sum())
-        stiffness = float(rod.EI_array()[:, 0, 0].min()) if len(rod.hinge_array()) else np.inf
-        radius = float(rod.radius_array().mean())
-        if scene.fluid is not None and scene.fluid.model != "none":
-            logarithm = np.log(2.0 * length / radius) + 0.5
-            drag = 4.0 * np.pi * scene.fluid.viscosity / logarithm
-            times.append(drag * length**4 / (4.73**4 * stiffness))
-        else:
-            mass = float(rod.density_array().mean()) * np.pi * radius**2
-            times.append(2.0 * np.pi * np.sqrt(mass * length**4 / stiffness) / 4.73**2)
-    return float(max(times))
-
-
-def default_step(scene: Scene) -> float:
-    """Return the step of the implicit schemes [s]: a small turn, or a part of the relaxation time."""
-    rate = fastest_rate(scene)
-    if rate > 0.0:
-        return TURN_PER_STEP / rate
-    relaxation = relaxation_time(scene)
-    return relaxation / 100.0 if relaxation > 0.0 else 1e-2
 
 
 def explicit_limit(resistance: FloatArray, mass: FloatArray) -> float:

@@ -11,10 +11,16 @@ from typing import Any, Self
 import numpy as np
 
 from flagrs import trajectory_file
-from flagrs.errors import FlagrsError
-from flagrs.measures import angle_about, slope, window
+from flagrs.budget import EnergyBudget, budget_of
+from flagrs.errors import FileError, FlagrsError
+from flagrs.flow import flow_of, immersed_edges
+from flagrs.fluid import hat_weights
+from flagrs.frame import shapes_of
+from flagrs.guards import Notice, notices
+from flagrs.measures import along, angle_about, slope, spin_about, window
 from flagrs.scene import Head, Motor, Scene, Table, codec
 from flagrs.scene.rod_topology import edges_at_nodes, far_end
+from flagrs.scene.scene_checks import edges_of_head
 from flagrs.scene.values import FloatArray
 from flagrs.trajectory_file import Contents
 
@@ -38,6 +44,8 @@ class Trajectory:
         Angles [rad], speeds [rad/s] and torques [N m] of the shafts (T, M).
     contacts : ndarray
         Number of touching pairs of edges (T,).
+    account : ndarray
+        What `energy_budget` and `warnings` read (T, 42).
     energy : ndarray
         Stretching, bending and twisting energy (T, 3) [J].
     scene : Scene
@@ -65,6 +73,7 @@ class Trajectory:
         self.motor_torque = frames["motor_torque"]
         self.contacts = frames["contacts"].astype(np.int64)
         self.energy = frames["energy"]
+        self.account = frames["account"]
         self.scene = scene
         self.settings: dict[str, Any] = json.loads(contents.manifest["settings"])
         self.path = path
@@ -76,13 +85,40 @@ class Trajectory:
         """Return the trajectory in a file, whether its run finished, goes on, or was killed.
 
         Signals that were Python functions come back as tables of their values at the frames.
+
+        Raises
+        ------
+        FileError
+            If the file is missing, cannot be read, has changed since it was written, or is no trajectory; an
+            `OSError`.
         """
         contents = trajectory_file.read(Path(path))
-        return cls(contents, recorded_scene(contents), Path(path))
+        try:
+            scene = recorded_scene(contents)
+            trajectory = cls(contents, scene, Path(path))
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            raise FileError(path, f"damaged: its scene or settings ({error})") from None
+        wrong = [name for name, shape in shapes_of(scene).items() if contents.frames[name].shape[1:] != shape]
+        if wrong:
+            raise FileError(path, f"damaged: {', '.join(wrong)} do not fit its scene")
+        return trajectory
 
-    def save(self, path: str | Path) -> None:
-        """Write the trajectory to a file, with its last checkpoint if it has one."""
-        trajectory_file.write_whole(Path(path), self._contents)
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write the trajectory to a file, with its last checkpoint if it has one.
+
+        Parameters
+        ----------
+        path
+            The file.
+        overwrite
+            Whether one that is there already is replaced.
+
+        Raises
+        ------
+        FileError
+            If it is there already, is written by a run, or cannot be written; an `OSError`.
+        """
+        trajectory_file.write_whole(Path(path), self._contents, overwrite)
 
     @property
     def has_checkpoint(self) -> bool:
@@ -111,8 +147,13 @@ class Trajectory:
         Raises
         ------
         FlagrsError
-            If fewer than two frames lie in the window.
+            If fewer than two frames lie in the window, or clamps hold filaments and there is no head.
         """
+        if self.scene.head is None and self.scene.clamps:
+            raise FlagrsError(
+                "no swimming speed: clamps hold or move the filaments; see energy_budget() for what they "
+                "spend, and thrust() for the force on the fluid"
+            )
         inside = window(self.time, start, end)
         return float(np.linalg.norm(slope(self.time[inside], self.position()[inside])))
 
@@ -151,8 +192,14 @@ class Trajectory:
         rod = self.scene.rods[head.rod]
         edges = edges_at_nodes(rod.edge_array(), len(rod.nodes))[head.node]
         before, after = sorted(far_end(rod.edge_array(), edge, head.node) for edge in edges)
+        axis = self.shaft_axis()
         arms = self.nodes[:, self._global_node(head, after)] - self.nodes[:, self._global_node(head, before)]
-        return angle_about(self.shaft_axis(), arms)
+        if not along(axis, arms).any():
+            return angle_about(axis, arms)
+        # The head's own edges run along the axis: they turn about it with their material frames.
+        edge = edges_of_head(self.scene, head)[0]
+        start, end = (self.nodes[:, self._global_node(head, int(k))] for k in rod.edge_array()[edge])
+        return spin_about(axis, end - start, self.theta[:, self.scene.edge_offset(head.rod) + edge])
 
     def shaft_axis(self) -> FloatArray:
         """Return the mean direction (3,) of the shafts, from motor to flagellum, over motors and frames.
@@ -229,6 +276,37 @@ class Trajectory:
             raise FlagrsError(f"the motors spend no power in the window (mean {power:g} W); no efficiency")
         resistance = head.C_t * 6.0 * math.pi * fluid.viscosity * head.radius
         return resistance * self.swimming_speed(start, end) ** 2 / power
+
+    def energy_budget(self) -> EnergyBudget:
+        """Return the energy given, taken and stored since the start, frame by frame, and the defect."""
+        return budget_of(self.account)
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """What the run warned of, with the worst value of each kind up to the last frame."""
+        return tuple(notices(self.account[-1], self.scene)) if len(self) else ()
+
+    def thrust(self) -> FloatArray:
+        """Return the total force (T, 3) of the immersed edges on the fluid [N]; the head's is not in it."""
+        edges, _ = immersed_edges(self.scene)
+        frames = zip(self.nodes, self.force_density, strict=True)
+        forces = [hat_weights(nodes, edges, density).sum(axis=0) for nodes, density in frames]
+        return np.array(forces).reshape(-1, 3)
+
+    def flow(self, points: Any, frame: int = -1, threads: int | None = None) -> FloatArray:
+        """Return the velocity (M, 3) of the fluid at points (M, 3) [m] in a frame [m/s].
+
+        It is the flow the immersed edges drive; dry edges, whose nodes may belong to immersed ones too, have
+        no part in it, and the head stirs none.
+
+        Raises
+        ------
+        FlagrsError
+            If the fluid is not of regularized Stokeslet segments, which alone have a flow.
+        SceneError
+            For points of the wrong shape.
+        """
+        return flow_of(self.scene, self.nodes[frame], self.force_density[frame], points, threads)
 
     def minimum_gap(self) -> FloatArray:
         """Return the smallest gap (T,) between colliding edges, surface to surface, or infinity [m]."""

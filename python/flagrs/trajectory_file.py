@@ -1,19 +1,21 @@
 """Trajectories in HDF5 files that stay readable whenever the writing process dies.
 
 The structure is laid out in a temporary file that then takes the final name, and from there on frames are
-added in HDF5's single-writer-multiple-reader (SWMR) mode, in which the file is consistent at every instant.
-SWMR forbids new objects, so everything that may come later has its place from the start: a count of the
-frames that are complete, written after them, and two slots for checkpoints, used in turn, so that one is
-always whole.
+added (`trajectory_writer`) in HDF5's single-writer-multiple-reader (SWMR) mode, in which the file is
+consistent at every instant. SWMR forbids new objects, so everything that may come later has its place from
+the start: a count of the frames that are complete, written after them, and two slots for checkpoints, used
+in turn, so that one is always whole. Frames, manifest, count and checkpoints have checksums of their own,
+and a file that was closed ends in a digest of all its bytes (`trajectory_checks`).
 """
 
 from __future__ import annotations
 
 import io
 import os
-import time
-import zlib
-from collections.abc import Mapping
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,14 +24,20 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from flagrs.errors import FlagrsError
+from flagrs import trajectory_checks
+from flagrs.errors import FileError, FileMissingError, FlagrsError, file_error
+from flagrs.files import Lock, check_output, publish, temporary_beside
 from flagrs.frame import FIELDS
+from flagrs.safe_stream import SafeStream
 from flagrs.scene.values import FloatArray
+from flagrs.trajectory_checks import FORMAT, FORMAT_VERSION, Damaged
 
-FORMAT = "flagrs trajectory"
-FORMAT_VERSION = 1
 #: Size of a chunk of positions, within the range h5py advises for chunks [bytes].
 CHUNK_BYTES = 64 * 1024
+
+#: Longest look at a file that nothing vouches for [s], besides 1 s for every 10 MB: it is limited by its own
+#: processor time, this is for a machine that has none to give.
+LOOK_SECONDS = 60.0
 
 State = dict[str, npt.NDArray[Any]]
 
@@ -65,101 +73,147 @@ class Contents:
     wall_seconds: float = 0.0
 
 
-class TrajectoryWriter:
-    """The open file of a running simulation.
+def write_whole(path: Path, contents: Contents, overwrite: bool = False) -> None:
+    """Write a trajectory at once; the file takes its name when it is whole.
 
-    Parameters
-    ----------
-    path
-        Where the file goes; one that is there already is replaced.
-    contents
-        Manifest, and what the file starts with; the shapes of the fields are taken from its arrays.
+    Raises
+    ------
+    FileError
+        If the file is there already and is not to be overwritten, belongs to a run at work, or cannot be
+        written.
     """
-
-    def __init__(self, path: Path, contents: Contents) -> None:
-        write_whole(path, contents)
-        self._file = h5py.File(path, "r+", libver="latest")
-        self._file.swmr_mode = True
-        self._count = len(contents.frames["time"])
-        self._sequence = 1 if contents.state is not None else 0
-        self._started = time.perf_counter() - contents.wall_seconds
-
-    def write(self, frames: Mapping[str, FloatArray], signals: Mapping[str, FloatArray]) -> None:
-        """Add a block of frames: field arrays (T, ...), and samples (T,) of the signals."""
-        end = self._count + len(frames["time"])
-        for group, arrays in (("frames", frames), ("signals", signals)):
-            for name, array in arrays.items():
-                dataset = self._file[group][name]
-                dataset.resize(end, axis=0)
-                dataset[self._count :] = array
-        self._file.flush()
-        # Counted only once they are whole: what dies before this line leaves the old count.
-        self._file["count"][()] = end
-        self._file["wall_seconds"][()] = time.perf_counter() - self._started
-        self._file.flush()
-        self._count = end
-
-    def checkpoint(self, state: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Store a state to resume from, in the slot that does not hold the latest one."""
-        self._sequence += 1
-        _write_slot(self._file, self._sequence, state, self._count)
-
-    def close(self, finished: bool) -> None:
-        """Close the file, marking whether the run reached its end."""
-        if self._file:
-            self._file["wall_seconds"][()] = time.perf_counter() - self._started
-            self._file["finished"][()] = finished
-            self._file.flush()
-            self._file.close()
+    lock = Lock(path) if check_output(path, overwrite) else None
+    try:
+        temporary = laid_out(path, contents)
+        try:
+            with temporary.open("r+b", buffering=0) as file:
+                seal(path, file.fileno())
+            publish(temporary, path, replace=lock is not None)
+        finally:
+            temporary.unlink(missing_ok=True)
+    finally:
+        if lock is not None:
+            lock.release()
 
 
-def write_whole(path: Path, contents: Contents) -> None:
-    """Write a trajectory at once; a file that is there already is replaced only when the new one is whole."""
-    temporary = path.with_name(path.name + ".new")
-    with h5py.File(temporary, "w", libver="latest") as file:
-        _lay_out(file, contents)
-    os.replace(temporary, path)
+def laid_out(path: Path, contents: Contents) -> Path:
+    """Return a temporary file beside a path, with every object the file will ever have and what there is.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written; nothing is left of it then.
+    """
+    temporary = temporary_beside(path)
+    try:
+        stream = SafeStream(temporary)
+        try:
+            with h5py.File(stream, "w", libver="latest") as file:
+                _lay_out(file, contents)
+        finally:
+            stream.close()
+        if stream.error is not None:
+            raise file_error(path, stream.error, "cannot be written") from None
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    return temporary
+
+
+def seal(path: Path, descriptor: int) -> None:
+    """End a closed file in a digest of its bytes.
+
+    Raises
+    ------
+    FileError
+        If there is no room for it; the file is as good without.
+    """
+    size = trajectory_checks.end_of_data(os.pread(descriptor, 48, 0))
+    try:
+        os.ftruncate(descriptor, size)
+        with os.fdopen(os.dup(descriptor), "rb") as file:
+            end = trajectory_checks.seal_of(file, size)
+        if os.pwrite(descriptor, end, size) < len(end):
+            os.ftruncate(descriptor, size)
+    except OSError as error:
+        os.ftruncate(descriptor, size)
+        raise file_error(path, error, "cannot be written") from None
 
 
 def read(path: Path) -> Contents:
     """Return what a file holds, whether its run ended, was killed, or still goes on.
 
+    Every byte that is used has been checked. A file that was closed is compared with its digest; any other is
+    looked at by a process of its own first, as HDF5 may hang or crash on what is damaged.
+
     Raises
     ------
     FileNotFoundError
         If there is no such file.
-    FlagrsError
-        If it is not a trajectory of flagrs.
+    FileError
+        If it cannot be read, is damaged, or not a trajectory of flagrs; an `OSError` and a `FlagrsError`.
     """
-    with _open(path) as file:
-        if file.attrs.get("format") != FORMAT:
-            raise FlagrsError(f"{path}: not a flagrs trajectory")
-        if file.attrs["format_version"] > FORMAT_VERSION:
-            raise FlagrsError(f"{path}: written by a newer flagrs, {file['manifest/version'].asstr()[()]}")
-        count = int(file["count"][()])
-        state, state_frames = _read_newest_slot(file)
-        return Contents(
-            manifest={name: text.asstr()[()] for name, text in file["manifest"].items()},
-            frames={name: dataset[:count] for name, dataset in file["frames"].items()},
-            signals={name: dataset[:count] for name, dataset in file["signals"].items()},
-            state=state,
-            state_frames=state_frames,
-            finished=bool(file["finished"][()]),
-            wall_seconds=float(file["wall_seconds"][()]),
-        )
-
-
-def _open(path: Path) -> h5py.File:
-    if not path.exists():
-        raise FileNotFoundError(f"{path}: no such file")
     try:
-        return h5py.File(path, "r")
-    except OSError:
-        # The mark of an open writer is still set: it is running, or was killed. SWMR reads both.
-        try:
-            return h5py.File(path, "r", libver="latest", swmr=True)
-        except OSError as error:
-            raise FlagrsError(f"{path}: not a readable HDF5 file ({error})") from None
+        if not path.exists():
+            raise FileMissingError(path, "no such file", 2)
+        if not path.is_file():
+            raise FileError(path, "not a file")
+        if not trajectory_checks.is_sealed(os.fspath(path)):
+            _look_at(path)
+        raw = trajectory_checks.load(os.fspath(path))
+        state = _arrays(raw.pop("state"))
+    except Damaged as error:
+        raise FileError(path, str(error)) from None
+    except (FileError, FlagrsError):
+        raise
+    except (OSError, ValueError) as error:
+        raise file_error(path, error, "cannot be read") from None
+    if raw["frames"].keys() != FIELDS.keys():
+        odd = ", ".join(sorted(raw["frames"].keys() ^ FIELDS.keys()))[:200]
+        raise FileError(path, f"damaged: missing or unknown fields: {odd}")
+    return Contents(state=state, **raw)
+
+
+def _look_at(path: Path) -> None:
+    """Read a file in a process of its own; raise FileError for what it finds, and if it has to be ended."""
+    if not sys.executable:
+        return  # embedded interpreters cannot start another
+    command = [sys.executable, "-I", trajectory_checks.__file__, os.fspath(path.absolute())]
+    limit = LOOK_SECONDS + path.stat().st_size / 1e7
+    try:
+        look = subprocess.run(
+            command, capture_output=True, timeout=limit, check=False, stdin=subprocess.DEVNULL
+        )
+    except subprocess.TimeoutExpired:
+        raise FileError(path, "damaged: reading it does not come to an end") from None
+    if look.returncode == 1 and look.stdout.strip():
+        raise FileError(path, look.stdout.decode("utf-8", "replace").strip())
+    if look.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        raise FileError(path, "damaged: reading it does not come to an end")
+    if look.returncode != 0:
+        raise FileError(path, "damaged: HDF5 cannot read it")
+
+
+def _arrays(archive: bytes | None) -> State | None:
+    """Return the arrays of a checkpoint."""
+    if archive is None:
+        return None
+    try:
+        with np.load(io.BytesIO(archive), allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    except Exception as error:  # numpy and zipfile raise whatever they stumble on
+        raise Damaged(f"damaged: its checkpoint ({error})") from None
+
+
+def archived(state: Mapping[str, npt.NDArray[Any]]) -> bytes:
+    """Return the arrays of a checkpoint as bytes."""
+    buffer = io.BytesIO()
+    for name, array in state.items():
+        if np.asarray(array).dtype.hasobject:
+            raise FlagrsError(f"checkpoint: {name} holds Python objects, not numbers")
+    arrays: dict[str, Any] = {name: np.asarray(array) for name, array in state.items()}
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
 
 
 def _lay_out(file: h5py.File, contents: Contents) -> None:
@@ -169,21 +223,19 @@ def _lay_out(file: h5py.File, contents: Contents) -> None:
     for name, text in contents.manifest.items():
         # Datasets, as the scene of many rods outgrows the 64 kB of a plain HDF5 attribute.
         file["manifest/" + name] = text
+    names = {"frames": list(contents.frames), "signals": list(contents.signals)}
+    file["manifest_sum"] = trajectory_checks.manifest_sum(contents.manifest, names)
     count = len(contents.frames["time"])
     file["count"], file["finished"], file["wall_seconds"] = count, contents.finished, contents.wall_seconds
-    rows = max(
-        1, CHUNK_BYTES // (contents.frames["nodes"][:0].itemsize * 3 * contents.frames["nodes"].shape[1])
-    )
+    file["progress_sum"] = trajectory_checks.progress_sum(count, contents.wall_seconds, contents.finished)
+    rows = chunk_rows(contents)
     for group, arrays in (("frames", contents.frames), ("signals", contents.signals)):
         file.create_group(group)
         for name, array in arrays.items():
-            # HDF5 has no empty chunks, but a scene without motors has arrays without columns.
-            chunk = (rows, *(max(1, size) for size in array.shape[1:]))
-            dataset = file[group].create_dataset(
-                name, data=array, maxshape=(None, *(size or None for size in array.shape[1:])), chunks=chunk
-            )
+            dataset = _growing(file[group], name, np.asarray(array, dtype=np.float64), rows)
             if name in FIELDS:
                 dataset.attrs["unit"], dataset.attrs["meaning"] = FIELDS[name].unit, FIELDS[name].meaning
+    _growing(file, "sums", trajectory_checks.frame_sums(0, contents.frames, contents.signals), rows)
     for slot in ("slot0", "slot1"):
         file.create_dataset(
             "checkpoint/" + slot, shape=(0,), maxshape=(None,), dtype=np.uint8, chunks=(CHUNK_BYTES,)
@@ -191,33 +243,35 @@ def _lay_out(file: h5py.File, contents: Contents) -> None:
     # For each slot: sequence number (0: empty), length in bytes, checksum, number of frames.
     file["checkpoint/slots"] = np.zeros((2, 4), dtype=np.int64)
     if contents.state is not None:
-        _write_slot(file, 1, contents.state, contents.state_frames)
+        write_slot(file, file.flush, 1, archived(contents.state), contents.state_frames)
 
 
-def _write_slot(file: h5py.File, sequence: int, state: Mapping[str, npt.NDArray[Any]], frames: int) -> None:
-    buffer = io.BytesIO()
-    for name, array in state.items():
-        if np.asarray(array).dtype.hasobject:
-            raise FlagrsError(f"checkpoint: {name} holds Python objects, not numbers")
-    arrays: dict[str, Any] = {name: np.asarray(array) for name, array in state.items()}
-    np.savez(buffer, **arrays)
-    content = np.frombuffer(buffer.getvalue(), dtype=np.uint8)
-    slot = file[f"checkpoint/slot{sequence % 2}"]
+def chunk_rows(contents: Contents) -> int:
+    """Return how many frames a chunk has."""
+    nodes = int(contents.frames["nodes"].shape[1])
+    return max(1, CHUNK_BYTES // max(1, 24 * nodes))
+
+
+def _growing(group: h5py.Group, name: str, array: npt.NDArray[Any], rows: int) -> h5py.Dataset:
+    # HDF5 has no empty chunks, but a scene without motors has arrays without columns.
+    chunk = (rows, *(max(1, size) for size in array.shape[1:]))
+    longest = (None, *(size or None for size in array.shape[1:]))
+    return group.create_dataset(name, data=array, maxshape=longest, chunks=chunk)
+
+
+def write_slot(
+    datasets: Mapping[str, h5py.Dataset],
+    flush: Callable[[], None],
+    sequence: int,
+    archive: bytes,
+    frames: int,
+) -> None:
+    """Write a checkpoint into the slot its number belongs to, and note it when it is whole."""
+    content = np.frombuffer(archive, dtype=np.uint8)
+    slot = datasets[f"checkpoint/slot{sequence % 2}"]
     slot.resize(max(len(slot), len(content)), axis=0)
     slot[: len(content)] = content
-    file.flush()
-    file["checkpoint/slots"][sequence % 2] = [sequence, len(content), zlib.crc32(content.tobytes()), frames]
-    file.flush()
-
-
-def _read_newest_slot(file: h5py.File) -> tuple[State | None, int]:
-    """Return the newest whole checkpoint and its number of frames, or None."""
-    entries = file["checkpoint/slots"][()]
-    for which in np.argsort(-entries[:, 0]).tolist():
-        sequence, size, checksum, frames = entries[which].tolist()
-        content = file[f"checkpoint/slot{which}"][:size].tobytes()
-        # A slot whose writing was cut off does not match its checksum; the other one is whole.
-        if sequence > 0 and zlib.crc32(content) == checksum:
-            with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-                return {name: archive[name] for name in archive.files}, frames
-    return None, 0
+    flush()
+    checksum = trajectory_checks.slot_sum(archive, sequence, len(archive), frames)
+    datasets["checkpoint/slots"][sequence % 2] = [sequence, len(archive), checksum, frames]
+    flush()

@@ -13,7 +13,7 @@
 //! each other's cores: [`potential`] is the way in. Below it, [`bodies`] numbers what can touch;
 //! [`candidates`] keeps the near pairs; [`pair`] is the energy of one of them, made of a
 //! [`barrier`] on each [`separation`], weighted by their [`angle`]; [`continuous`] cuts a step before
-//! a core is reached; [`friction`] acts on the contacts of the state before.
+//! a core is reached; [`friction`] acts on each contact with its [`push`]; [`stiffness`] says how stiff a pair is.
 
 pub mod angle;
 pub mod barrier;
@@ -26,5 +26,7 @@ pub mod exclusion;
 pub mod friction;
 pub mod pair;
 pub mod potential;
+pub mod push;
 pub mod separation;
 pub mod spillmann;
+pub mod stiffness;

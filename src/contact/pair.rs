@@ -67,28 +67,19 @@ pub enum Curvature {
     Definite,
 }
 
-/// Where a pair pushes and how hard, over stiffness.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Push {
-    /// Force on A, m^2.
-    pub force: Vec3,
-    /// Centres of force on A and B, each in `[0, 1]`.
-    pub places: [f64; 2],
-}
-
 /// The angle's part in the energy; spheres have none.
-struct Blend {
-    angle: Option<Angle>,
-    point: Derivatives,
-    line: Derivatives,
+pub(super) struct Blend {
+    pub angle: Option<Angle>,
+    pub point: Derivatives,
+    pub line: Derivatives,
 }
 
 /// A distance within range, and how often it counts in the two sums.
-struct Contribution {
-    separation: Separation,
-    barrier: BarrierValue,
-    point: f64,
-    line: f64,
+pub(super) struct Contribution {
+    pub separation: Separation,
+    pub barrier: BarrierValue,
+    pub point: f64,
+    pub line: f64,
 }
 
 impl Pair {
@@ -177,26 +168,7 @@ impl Pair {
         Some(PairEnergy { energy: blend.point[0] * point + blend.line[0] * line, gradient, hessian })
     }
 
-    /// The resultant of the pair and its centres; `None` where it does not push A and B apart.
-    pub fn push(&self, x: &[Vec3; 4]) -> Option<Push> {
-        let closest = Separation::of_segments(x);
-        if closest.distance >= self.barrier.most() {
-            return None;
-        }
-        let blend = self.blend(x);
-        let (mut force, mut moments, mut total) = (Vec3::zeros(), [0.0; 2], 0.0);
-        self.visit(x, closest, |c| {
-            let pressure = -(blend.point[0] * c.point + blend.line[0] * c.line) * c.barrier.slope;
-            force += c.separation.normal * pressure;
-            total += pressure;
-            for side in 0..2 {
-                moments[side] += pressure * c.separation.places[side];
-            }
-        });
-        (total > 0.0).then(|| Push { force, places: moments.map(|moment| (moment / total).clamp(0.0, 1.0)) })
-    }
-
-    fn blend(&self, x: &[Vec3; 4]) -> Blend {
+    pub(super) fn blend(&self, x: &[Vec3; 4]) -> Blend {
         let Some(rest_lengths) = self.rest_lengths else {
             return Blend { angle: None, point: [self.reach, 0.0, 0.0], line: [0.0; 3] };
         };
@@ -207,7 +179,7 @@ impl Pair {
 
     /// Goes through the distances in range; `closest`, that of the segments, is one of them.
     #[inline]
-    fn visit(&self, x: &[Vec3; 4], closest: Separation, mut each: impl FnMut(&Contribution)) {
+    pub(super) fn visit(&self, x: &[Vec3; 4], closest: Separation, mut each: impl FnMut(&Contribution)) {
         let mut offer = |separation: Separation, point: f64, line: f64| {
             if separation.distance < self.barrier.most() {
                 let barrier = self.barrier.at(separation.distance);

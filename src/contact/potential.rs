@@ -8,9 +8,11 @@ use super::bodies::{Bodies, Body};
 use super::candidates::Candidates;
 use super::continuous::safe_part;
 use super::distance::segment_distance;
-use super::friction::{Friction, LaggedContact};
+use super::friction::{Friction, SlidingContact};
 use super::pair::{Curvature, Pair};
+use super::push::Push;
 use super::separation::{Gradient12, Hessian12};
+use super::stiffness::Stiffness;
 use crate::Vec3;
 
 /// Default tolerance: rods act on each other between 0.95 and 1.05 of the sum of their radii.
@@ -24,27 +26,41 @@ const SKIN_PER_RADIUS: f64 = 1.0;
 pub struct BarrierLaw {
     bodies: Bodies,
     delta: f64,
-    stiffness: f64,
+    stiffness: Stiffness,
     skin: f64,
     friction: Option<Friction>,
+    /// Smoothing velocity of every body's contacts, m/s, the larger of two counts; empty if all have that of `friction`.
+    slip_velocities: Vec<f64>,
 }
 
 /// The near pairs of one state of a scene, and the contacts whose friction acts.
 #[derive(Clone)]
 pub struct BarrierState {
     candidates: Candidates,
-    /// Ascending: the candidates and, besides, the pairs with friction.
+    /// Of the candidates, in their order.
     elements: Vec<Element>,
-    lagged: Vec<Lagged>,
+    /// Contacts that push at the positions of the last [`BarrierLaw::find_sliding`], and their elements.
+    sliding: Vec<(usize, SlidingContact)>,
     /// Factor on the smoothing velocity of friction.
     widening: f64,
 }
 
-#[derive(Clone)]
-struct Lagged {
-    bodies: [usize; 2],
-    element: usize,
-    contact: LaggedContact,
+/// The largest changes of sliding velocities that are still to be made.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SlipChange {
+    /// Over the smoothing velocity.
+    pub over_smoothing: f64,
+    /// Over the smoothing velocity or, where that is larger, the sliding velocity itself.
+    pub relative: f64,
+}
+
+/// Which derivative of friction is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionDerivative {
+    /// Derivative of every velocity with respect to its position, 1/s.
+    pub rate: f64,
+    /// The exact one, or the part that is symmetric and positive semidefinite: that of the velocities.
+    pub curvature: Curvature,
 }
 
 #[derive(Clone)]
@@ -54,6 +70,9 @@ struct Element {
     nodes: [usize; 4],
     rows: [usize; 4],
     count: usize,
+    stiffness: f64,
+    /// Smoothing velocity of friction, m/s.
+    slip_velocity: f64,
 }
 
 /// Two bodies and how far apart they are.
@@ -91,7 +110,7 @@ pub struct ContactForce {
     /// Force on the first body, N; the second has its opposite.
     pub force: Vec3,
     /// Nodes, weights, direction and size, as friction needs them.
-    pub lagged: LaggedContact,
+    pub contact: SlidingContact,
 }
 
 impl BarrierLaw {
@@ -103,7 +122,22 @@ impl BarrierLaw {
         assert!(delta > 0.0 && delta < 1.0, "the tolerance is between 0 and 1");
         assert!(stiffness > 0.0, "the stiffness is positive");
         let skin = SKIN_PER_RADIUS * bodies.thinnest();
-        Self { bodies, delta, stiffness, skin, friction: None }
+        let stiffness = Stiffness::Uniform(stiffness);
+        Self { bodies, delta, stiffness, skin, friction: None, slip_velocities: Vec::new() }
+    }
+
+    /// The same law with a stiffness for every pair.
+    pub fn with_stiffness(self, stiffness: Stiffness) -> Self {
+        Self { stiffness, ..self }
+    }
+
+    /// The same law with a smoothing velocity of friction for every body, m/s; the larger of two counts.
+    ///
+    /// # Panics
+    /// Unless there is one for every body.
+    pub fn with_slip_velocities(self, slip_velocities: Vec<f64>) -> Self {
+        assert_eq!(slip_velocities.len(), self.bodies.radius().len(), "one slip velocity per body");
+        Self { slip_velocities, ..self }
     }
 
     /// Prescribes the skin of the list of near pairs, m.
@@ -116,9 +150,16 @@ impl BarrierLaw {
         Self { friction: Some(friction), ..self }
     }
 
-    /// Stiffness `kappa`, Pa.
-    pub fn stiffness(&self) -> f64 {
-        self.stiffness
+    /// Stiffness `kappa` of a pair, Pa.
+    pub fn stiffness(&self, [a, b]: [usize; 2]) -> f64 {
+        self.stiffness.of([a, b], self.bodies.radius()[a] + self.bodies.radius()[b], self.delta)
+    }
+
+    /// The stiffness (Pa) with which a pair that touches at a point holds a force (N) at the sum of its radii.
+    pub fn stiffness_to_hold(&self, [a, b]: [usize; 2], force: f64) -> f64 {
+        let thickness = self.bodies.radius()[a] + self.bodies.radius()[b];
+        let reach = thickness * (2.0 * self.delta).sqrt();
+        force / (reach * self.bodies.barrier([a, b], self.delta).at(thickness).slope.abs())
     }
 
     /// Tolerance `delta`.
@@ -139,11 +180,11 @@ impl BarrierLaw {
     /// A state without pairs; [`Self::ensure`] fills it.
     pub fn state(&self) -> BarrierState {
         let candidates = Candidates::new(&self.bodies, self.delta, self.skin);
-        BarrierState { candidates, elements: Vec::new(), lagged: Vec::new(), widening: 1.0 }
+        BarrierState { candidates, elements: Vec::new(), sliding: Vec::new(), widening: 1.0 }
     }
 
     /// Makes the state's elements hold every pair in range of `nodes` (m), and says whether they have changed, and with them the
-    /// stencils. Pairs with friction stay until [`Self::lag`] lets them go.
+    /// stencils.
     pub fn ensure(&self, state: &mut BarrierState, nodes: &[Vec3]) -> bool {
         state.candidates.ensure(&self.bodies, nodes) && self.list_elements(state)
     }
@@ -153,36 +194,35 @@ impl BarrierLaw {
         if state.candidates.anchor() == anchor {
             return false;
         }
-        state.lagged.clear();
         state.candidates.list(&self.bodies, anchor);
         self.list_elements(state)
     }
 
-    /// Makes elements of the near pairs and those with friction; whether they have changed.
+    /// Makes elements of the near pairs; whether they have changed.
     fn list_elements(&self, state: &mut BarrierState) -> bool {
-        let with_friction = state.lagged.iter().map(|lagged| lagged.bodies);
-        let mut pairs: Vec<[usize; 2]> = state.candidates.pairs().iter().copied().chain(with_friction).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
+        let pairs = state.candidates.pairs();
         if pairs.iter().eq(state.elements.iter().map(|element| &element.bodies)) {
             return false;
         }
+        state.sliding.clear();
         state.elements.clear();
-        state.elements.extend(pairs.iter().map(|&bodies| {
-            let (nodes, count) = self.bodies.stencil(bodies);
-            let (rows, _) = self.bodies.rows(bodies);
-            Element { bodies, pair: self.bodies.pair(bodies, self.delta), nodes, rows, count }
-        }));
-        for lagged in &mut state.lagged {
-            lagged.element = pairs.binary_search(&lagged.bodies).expect("pairs with friction are elements");
-        }
+        state.elements.extend(pairs.iter().map(|&bodies| self.element(bodies)));
         true
+    }
+
+    fn element(&self, bodies: [usize; 2]) -> Element {
+        let (nodes, count) = self.bodies.stencil(bodies);
+        let (rows, _) = self.bodies.rows(bodies);
+        let own = |body: usize| self.slip_velocities.get(body).copied();
+        let common = self.friction.map_or(f64::INFINITY, |friction| friction.smoothing_velocity);
+        let slip_velocity = own(bodies[0]).zip(own(bodies[1])).map_or(common, |(a, b)| a.max(b));
+        let (pair, stiffness) = (self.bodies.pair(bodies, self.delta), self.stiffness(bodies));
+        Element { bodies, pair, nodes, rows, count, stiffness, slip_velocity }
     }
 
     /// Energy, J; infinite if a pair is at its least distance or below.
     pub fn energy(&self, state: &BarrierState, nodes: &[Vec3]) -> f64 {
-        let sum: f64 = state.elements.iter().map(|e| e.pair.energy(&self.bodies.corners(e.bodies, nodes))).sum();
-        self.stiffness * sum
+        state.elements.iter().map(|e| e.stiffness * e.pair.energy(&self.bodies.corners(e.bodies, nodes))).sum()
     }
 
     /// Hands the gradient (N) and, if asked for, the second derivative (N/m, column by column) of every element in range to
@@ -199,57 +239,95 @@ impl BarrierLaw {
         for (index, element) in state.elements.iter().enumerate() {
             let x = self.bodies.corners(element.bodies, nodes);
             let Some(at) = element.pair.evaluate(&x, curvature) else { continue };
-            let gradient = at.gradient * self.stiffness;
-            let hessian = curvature.map(|_| at.hessian * self.stiffness);
+            let gradient = at.gradient * element.stiffness;
+            let hessian = curvature.map(|_| at.hessian * element.stiffness);
             element.hand_over(&gradient, hessian.as_ref(), |gradient, matrix| add(index, gradient, matrix));
         }
     }
 
-    /// Takes forces and directions of friction from `nodes` (m), in whose range the state must be ([`Self::ensure`]), and lets
-    /// go of pairs that are near no more; whether the elements have changed.
-    pub fn lag(&self, state: &mut BarrierState, nodes: &[Vec3]) -> bool {
-        state.lagged.clear();
-        if self.friction.is_none() {
-            return false;
+    /// Finds the contacts whose friction acts at `nodes` (m), in whose range the state must be ([`Self::ensure`]).
+    pub fn find_sliding(&self, state: &mut BarrierState, nodes: &[Vec3]) {
+        state.sliding.clear();
+        if self.friction.is_some() {
+            let pushing = |(index, element): (usize, &Element)| {
+                let push = element.pair.push(&self.bodies.corners(element.bodies, nodes))?;
+                Some((index, self.contact(element, &push)?))
+            };
+            state.sliding.extend(state.elements.iter().enumerate().filter_map(pushing));
         }
-        let changed = self.list_elements(state);
-        for (index, element) in state.elements.iter().enumerate() {
-            if let Some(force) = self.force(element, nodes) {
-                state.lagged.push(Lagged { bodies: element.bodies, element: index, contact: force.lagged });
-            }
-        }
-        changed
     }
 
-    fn friction_of(&self, state: &BarrierState) -> Option<Friction> {
-        self.friction.map(|friction| friction.widened(state.widening))
+    fn friction_of(&self, state: &BarrierState, element: usize) -> Option<Friction> {
+        let smoothing_velocity = state.widening * state.elements[element].slip_velocity;
+        self.friction.map(|friction| Friction { smoothing_velocity, ..friction })
     }
 
     /// Dissipation potential of friction (W) at the velocities of the nodes (m/s).
     pub fn friction_potential(&self, state: &BarrierState, velocities: &[Vec3]) -> f64 {
-        let Some(friction) = &self.friction_of(state) else { return 0.0 };
-        let potential =
-            |lagged: &Lagged| lagged.contact.potential(friction, &lagged.contact.nodes.map(|n| velocities[n]));
-        state.lagged.iter().map(potential).sum()
+        let potential = |(element, contact): &(usize, SlidingContact)| {
+            let friction = self.friction_of(state, *element)?;
+            Some(contact.potential(&friction, &contact.nodes.map(|n| velocities[n])))
+        };
+        state.sliding.iter().filter_map(potential).sum()
     }
 
     /// Hands the gradient of [`Self::friction_potential`] with respect to the velocities (N, minus the forces) and, if asked for,
-    /// its second derivative (N s/m) to `add`, as [`Self::add`] does, on the same elements.
+    /// the derivative of this gradient with respect to the positions (N/m, column by column) to `add`, as [`Self::add`] does, on the
+    /// same elements. `nodes` (m) are those of [`Self::find_sliding`].
     pub fn add_friction(
         &self,
         state: &BarrierState,
+        nodes: &[Vec3],
         velocities: &[Vec3],
-        with_matrix: bool,
+        derivative: Option<FrictionDerivative>,
         mut add: impl FnMut(usize, &[f64], Option<&[f64]>),
     ) {
-        let Some(friction) = &self.friction_of(state) else { return };
-        for Lagged { element, contact, .. } in &state.lagged {
+        for (index, contact) in &state.sliding {
+            let Some(friction) = &self.friction_of(state, *index) else { continue };
+            let element = &state.elements[*index];
             let velocities = contact.nodes.map(|node| velocities[node]);
             let gradient = contact.gradient(friction, &velocities);
-            let hessian = with_matrix.then(|| contact.hessian(friction, &velocities));
-            let hand = |gradient: &[f64], matrix: Option<&[f64]>| add(*element, gradient, matrix);
-            state.elements[*element].hand_over(&gradient, hessian.as_ref(), hand);
+            let hessian = derivative.map(|FrictionDerivative { rate, curvature }| {
+                let mut matrix = contact.hessian(friction, &velocities) * rate;
+                let x = self.bodies.corners(element.bodies, nodes);
+                if let (Curvature::Exact, Some((_, variation))) = (curvature, element.pair.push_with_variation(&x)) {
+                    matrix += contact.position_derivative(friction, &velocities, &variation, element.stiffness);
+                }
+                matrix
+            });
+            let hand = |gradient: &[f64], matrix: Option<&[f64]>| add(*index, gradient, matrix);
+            element.hand_over(&gradient, hessian.as_ref(), hand);
         }
+    }
+
+    /// What a change of all velocities is to the contacts with friction, as far as they matter: where friction that turned round
+    /// would displace the contact by more than `tolerance`, given how far every node yields to a force, `yielding` (1/N); both are relative to
+    /// the sizes of filaments.
+    pub fn slip_change(
+        &self,
+        state: &BarrierState,
+        velocities: &[Vec3],
+        change: &[Vec3],
+        yielding: &[f64],
+        tolerance: f64,
+    ) -> SlipChange {
+        let mut largest = SlipChange::default();
+        for (element, contact) in &state.sliding {
+            let Some(friction) = self.friction_of(state, *element) else { continue };
+            let yields = contact.weights.iter().zip(contact.nodes).map(|(w, node)| w * w * yielding[node]).sum::<f64>();
+            if 2.0 * friction.coefficient * contact.force * yields > tolerance {
+                let at = |values: &[Vec3]| contact.sliding(&contact.nodes.map(|node| values[node])).norm();
+                let (change, nu) = (at(change), friction.smoothing_velocity);
+                largest.over_smoothing = largest.over_smoothing.max(change / nu);
+                largest.relative = largest.relative.max(change / at(velocities).max(nu));
+            }
+        }
+        largest
+    }
+
+    /// Whether friction acts anywhere: its exact derivative is not symmetric.
+    pub fn slides(&self, state: &BarrierState) -> bool {
+        !state.sliding.is_empty()
     }
 
     /// The largest part in `[0, 1]` of the straight way from `from` to `to` (m) over which every pair that comes into range
@@ -324,16 +402,20 @@ impl BarrierLaw {
 
     fn force(&self, element: &Element, nodes: &[Vec3]) -> Option<ContactForce> {
         let push = element.pair.push(&self.bodies.corners(element.bodies, nodes))?;
+        let contact = self.contact(element, &push)?;
+        let bodies = element.bodies.map(|body| self.bodies.body(body));
+        Some(ContactForce { bodies, places: push.places, force: push.force * element.stiffness, contact })
+    }
+
+    fn contact(&self, element: &Element, push: &Push) -> Option<SlidingContact> {
         let (size, [s, t]) = (push.force.norm(), push.places);
         let ([a0, a1], [b0, b1]) = (self.bodies.ends()[element.bodies[0]], self.bodies.ends()[element.bodies[1]]);
-        let lagged = LaggedContact {
+        (size > 0.0).then(|| SlidingContact {
             nodes: [a0, a1, b0, b1],
             weights: [1.0 - s, s, t - 1.0, -t],
             normal: push.force / size,
-            force: self.stiffness * size,
-        };
-        let bodies = element.bodies.map(|body| self.bodies.body(body));
-        (size > 0.0).then(|| ContactForce { bodies, places: push.places, force: push.force * self.stiffness, lagged })
+            force: element.stiffness * size,
+        })
     }
 }
 

@@ -38,6 +38,14 @@ pub struct Separation {
     free: [bool; 2],
 }
 
+/// Derivatives of a separation with respect to the nodes `a0, a1, b0, b1`, 1/m.
+pub struct SeparationVariation {
+    /// Of the normal.
+    pub normal: SMatrix<f64, 3, 12>,
+    /// Of the places on A and B.
+    pub places: [Gradient12; 2],
+}
+
 impl Separation {
     /// Segment A and segment B; either may have no length.
     pub fn of_segments(x: &[Vec3; 4]) -> Self {
@@ -124,6 +132,34 @@ impl Separation {
                 }
             }
         }
+    }
+
+    /// How the normal and the places change with the nodes.
+    pub fn variation(&self, x: &[Vec3; 4]) -> SeparationVariation {
+        let (u, v) = (x[1] - x[0], x[3] - x[2]);
+        let (uu, vv) = (u.norm_squared(), v.norm_squared());
+        let mut places = [Gradient12::zeros(); 2];
+        match self.free {
+            [false, false] => {}
+            [true, false] => places[0] = self.row(&u, 0) * (-1.0 / uu),
+            [false, true] => places[1] = self.row(&v, 1) / vv,
+            [true, true] => {
+                let determinant = u.cross(&v).norm_squared();
+                if determinant > 0.0 {
+                    // G (ds, dt) = -(R_s, R_t), eliminated as in the second derivative.
+                    let (s, t, uv) = (self.row(&u, 0), -self.row(&v, 1), u.dot(&v));
+                    places[0] = (s + t * (uv / vv)) * (-vv / determinant);
+                    places[1] = (places[0] * uv - t) / vv;
+                }
+            }
+        }
+        let mut gap = SMatrix::<f64, 3, 12>::zeros();
+        for (i, w) in self.weights.iter().enumerate() {
+            gap.fixed_view_mut::<3, 3>(0, 3 * i).fill_diagonal(*w);
+        }
+        gap += u * places[0].transpose() - v * places[1].transpose();
+        let across = gap - self.normal * (self.normal.transpose() * gap);
+        SeparationVariation { normal: across / self.distance, places }
     }
 
     /// `along^T W + g^T (-I, I)` with the differences on the nodes of A (`side` 0) or B (`side` 1).

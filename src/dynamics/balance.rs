@@ -12,14 +12,16 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use rayon::ThreadPool;
-
 use super::barrier_term::BarrierTerm;
+use super::interrupt::Interrupt;
 use super::model::Model;
+use super::newton::Goal;
 use super::predictor::derivative_weights;
 use super::scheme::Scheme;
 use super::state::State;
 use super::statistics::Statistics;
+use super::targets::{Size, Targets};
+use super::threads::Threads;
 use crate::elastic::motors::Drive;
 use crate::fluid::FluidModel;
 use crate::fluid::ambient::Ambient;
@@ -97,6 +99,12 @@ impl<'a> Step<'a> {
         }
     }
 
+    /// What drives it.
+    pub fn into_drives(self) -> Drives {
+        let Self { motor_angles, motor_torques, inputs, ambient, outside, .. } = self;
+        Drives { motor_angles, motor_torques, inputs, ambient, outside }
+    }
+
     pub fn increment(&self) -> Increment<'_> {
         Increment {
             inputs: &self.inputs,
@@ -108,19 +116,6 @@ impl<'a> Step<'a> {
             velocity_drift: &self.velocity_drift,
         }
     }
-}
-
-/// Size of a residual and what it is to be compared with, both N.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Size {
-    /// Largest nodal force or, divided by the mean edge length, moment; velocities count with the local drag.
-    pub norm: f64,
-    /// Largest force other than elastic ones: they balance these, and may be far too large in a guess.
-    pub scale: f64,
-    /// Root of the sum of squares, for the line search.
-    pub merit: f64,
-    /// Degree of freedom with the largest residual.
-    pub worst: usize,
 }
 
 /// A trial solution: degrees of freedom and force density, and the tensions of edges as Newton's method sees them, linear
@@ -154,13 +149,22 @@ pub(super) struct Balance {
     node_slots: Vec<[usize; 9]>,
     pub(super) flow: Vec<f64>,
     pub(super) work: super::solve::Work,
-    constant: Vec<f64>,
-    contact: Vec<f64>,
-    pub(super) pool: Option<Arc<ThreadPool>>,
+    pub(super) targets: Targets,
+    pub(super) constant: Vec<f64>,
+    pub(super) contact: Vec<f64>,
+    /// What holds the prescribed degrees of freedom at the last residual, N or N m; zero elsewhere.
+    pub(super) reaction: Vec<f64>,
+    /// Outer forces of an accepted step, and a term's share in them.
+    pub(super) outer: Vec<f64>,
+    pub(super) share: Vec<f64>,
+    /// Rates that a background flow would give.
+    pub(super) carried: Vec<f64>,
+    pub(super) threads: Threads,
+    pub(super) interrupt: Interrupt,
 }
 
 impl Balance {
-    pub fn new(model: &Model, pool: Option<Arc<ThreadPool>>) -> Result<Self, LinearError> {
+    pub fn new(model: &Model, threads: Threads) -> Result<Self, LinearError> {
         let n = model.dof_count;
         let pattern = &model.pattern;
         let fluid = model.fluid()?;
@@ -209,6 +213,7 @@ impl Balance {
             barrier: model.barrier().map(BarrierTerm::new),
             gmres: Gmres::new(size, KRYLOV_LIMIT.min(size)),
             work: super::solve::Work::new(n, 3 * fluid_dofs.len()),
+            targets: Targets::new(model, fluid_dofs.len()),
             slip: vec![0.0; 3 * fluid_dofs.len()],
             flow: vec![0.0; 3 * fluid_dofs.len()],
             fluid,
@@ -217,7 +222,12 @@ impl Balance {
             node_slots,
             constant: vec![0.0; n],
             contact: vec![0.0; n],
-            pool,
+            reaction: vec![0.0; n],
+            outer: vec![0.0; n],
+            share: vec![0.0; n],
+            carried: vec![0.0; n],
+            threads,
+            interrupt: Interrupt::default(),
         })
     }
 
@@ -246,7 +256,7 @@ impl Balance {
     pub fn place_fluid(&mut self, positions: &[Vec3], statistics: &mut Statistics) -> Result<(), LinearError> {
         let start = Instant::now();
         let done = match &mut self.fluid {
-            Some(fluid) => fluid.update(positions, self.pool.as_deref()),
+            Some(fluid) => fluid.update(positions, self.threads.pool().as_deref()),
             None => Ok(()),
         };
         statistics.seconds_fluid += start.elapsed().as_secs_f64();
@@ -264,7 +274,7 @@ impl Balance {
         if let Some(fluid) = self.fluid.as_mut().filter(|_| !step.scheme.fluid_is_implicit()) {
             gather(&self.fluid_dofs, |dof| step.state.velocity[dof], &mut self.flow);
             subtract_background(step, fluid.immersed(), &mut self.flow);
-            fluid.resist(&mut self.flow, self.pool.as_deref())?;
+            fluid.resist(&mut self.flow, self.threads.pool().as_deref())?;
             scatter(&self.fluid_dofs, &self.flow, &mut self.constant);
         }
         statistics.seconds_fluid += start.elapsed().as_secs_f64();
@@ -320,14 +330,27 @@ impl Balance {
         limit
     }
 
-    /// Largest force per displacement that inertia and drag exert within the step, N/m.
-    pub fn largest_stiffness(&self, model: &Model, step: &Step) -> f64 {
-        let positions = model.network.node_dofs().iter().map(|&dof| model.mass[dof]);
-        let mass = positions.fold(0.0, f64::max);
-        let inertia = if step.scheme.has_inertia() { mass * step.rate * step.rate } else { 0.0 };
-        let implicit = self.fluid.as_ref().filter(|_| step.scheme.fluid_is_implicit());
-        let drag = implicit.map_or(0.0, |fluid| fluid.local().iter().map(Mat3::trace).fold(0.0, f64::max) / 3.0);
-        inertia + drag * step.rate
+    /// Sets what residuals are measured by in the solve of a step from the degrees of freedom `q`.
+    pub fn aim(&mut self, model: &Model, step: &Step, goal: Goal, q: &[f64]) {
+        self.targets.aim(model, step, goal, (self.fluid.as_deref_mut(), &self.fluid_dofs), q);
+    }
+
+    /// Weights merits and linear systems by what the last residual still lacks where; its merit in these weights.
+    pub fn weigh(&mut self, model: &Model) -> f64 {
+        self.targets.weigh(model, &self.fluid_dofs);
+        self.targets.size(model, &self.residual, &self.slip, &self.fluid_dofs).merit
+    }
+
+    /// Moves the configuration alone to given degrees of freedom; whether they are one.
+    pub fn place(&mut self, model: &Model, step: &Step, q: &[f64]) -> bool {
+        self.shafts.clear();
+        self.shafts.extend(model.motors.iter().zip(&step.motor_angles).map(|(motor, &angle)| motor.shaft(angle, q)));
+        self.configuration.update(&model.network, q, &step.state.frames, &self.shafts)
+    }
+
+    /// Takes the fluid's equation for solved.
+    pub fn forget_slip(&mut self) {
+        self.slip.fill(0.0);
     }
 
     /// Residual at a trial; `None` if it is not a configuration.
@@ -346,9 +369,7 @@ impl Balance {
 
     fn residual(&mut self, model: &Model, step: &Step, trial: &Unknowns, statistics: &mut Statistics) -> Option<Size> {
         let q = &trial.q;
-        self.shafts.clear();
-        self.shafts.extend(model.motors.iter().zip(&step.motor_angles).map(|(motor, &angle)| motor.shaft(angle, q)));
-        if !self.configuration.update(&model.network, q, &step.state.frames, &self.shafts) {
+        if !self.place(model, step, q) {
             return None;
         }
         let increment = step.increment();
@@ -380,18 +401,21 @@ impl Balance {
         for (residual, contact) in self.residual.iter_mut().zip(&self.contact) {
             *residual -= contact;
         }
-        Some(self.size(model, step)).filter(|size| size.merit.is_finite())
+        Some(self.size(model)).filter(|size| size.merit.is_finite())
     }
 
     fn add_fluid(&mut self, step: &Step, trial: &Unknowns) -> Option<()> {
         let Some(fluid) = self.fluid.as_mut().filter(|_| step.scheme.fluid_is_implicit()) else { return Some(()) };
-        let (increment, pool) = (step.increment(), self.pool.as_deref());
+        if self.interrupt.requested() {
+            return None;
+        }
+        let (increment, pool) = (step.increment(), self.threads.pool());
         gather(&self.fluid_dofs, |dof| increment.rate_of(dof, trial.q[dof]), &mut self.flow);
         subtract_background(step, fluid.immersed(), &mut self.flow);
         match fluid.nonlocal() {
-            None => fluid.resist(&mut self.flow, pool).ok()?,
+            None => fluid.resist(&mut self.flow, pool.as_deref()).ok()?,
             Some(mobility) => {
-                mobility.apply(&trial.density, &mut self.slip, pool).ok()?;
+                mobility.apply(&trial.density, &mut self.slip, pool.as_deref()).ok()?;
                 let scale = mobility.scale();
                 self.slip.iter_mut().zip(&self.flow).for_each(|(slip, velocity)| *slip -= scale * velocity);
                 mobility.weigh(&trial.density, &mut self.flow);
@@ -401,38 +425,13 @@ impl Balance {
         Some(())
     }
 
-    fn size(&mut self, model: &Model, step: &Step) -> Size {
-        let mut size = Size { norm: 0.0, scale: 0.0, merit: 0.0, worst: 0 };
-        let mut count = |force: f64, dof: usize| {
-            if force > size.norm {
-                size.norm = force;
-                size.worst = dof;
-            }
-            size.merit += force * force;
-        };
-        let mut scale: f64 = 0.0;
+    fn size(&mut self, model: &Model) -> Size {
+        self.targets.measure(model, &self.residual);
         for dof in 0..model.dof_count {
-            let weight = model.force_weight[dof];
             let total = self.residual[dof] + self.elastic[dof];
-            scale = scale.max(self.residual[dof].abs() * weight);
-            self.residual[dof] = if model.prescribed[dof] { 0.0 } else { total };
-            count(self.residual[dof].abs() * weight, dof);
+            (self.residual[dof], self.reaction[dof]) = if model.prescribed[dof] { (0.0, total) } else { (total, 0.0) };
         }
-        if let Some(drag) = self.drag_per_slip(step) {
-            for (k, slip) in self.slip.iter().enumerate() {
-                count(slip.abs() * drag, self.fluid_dofs[k / 3] + k % 3);
-            }
-        }
-        size.scale = scale;
-        size.merit = size.merit.sqrt();
-        size
-    }
-
-    /// Turns residuals of the fluid's equation into forces: mean local resistance over `8 pi mu`.
-    pub(super) fn drag_per_slip(&mut self, step: &Step) -> Option<f64> {
-        let fluid = self.fluid.as_mut().filter(|fluid| step.scheme.fluid_is_implicit() && !fluid.is_local())?;
-        let mean = fluid.local().iter().map(Mat3::trace).sum::<f64>() / (3.0 * fluid.local().len() as f64);
-        Some(mean / fluid.nonlocal()?.scale())
+        self.targets.size(model, &self.residual, &self.slip, &self.fluid_dofs)
     }
 
     /// Derivative of the force balance at the configuration of the last residual and the given tensions of edges, with every
@@ -501,7 +500,7 @@ impl Balance {
 }
 
 /// Makes velocities of immersed nodes those relative to the background flow.
-fn subtract_background(step: &Step, immersed: &[usize], flow: &mut [f64]) {
+pub(super) fn subtract_background(step: &Step, immersed: &[usize], flow: &mut [f64]) {
     let Some(ambient) = &step.ambient else { return };
     let velocities = ambient.background().node_velocities;
     for (&node, flow) in immersed.iter().zip(flow.chunks_exact_mut(3)) {

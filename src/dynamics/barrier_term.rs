@@ -2,7 +2,7 @@
 
 use crate::Vec3;
 use crate::contact::pair::Curvature;
-use crate::contact::potential::{Approach, BarrierLaw, BarrierState, ContactForce};
+use crate::contact::potential::{Approach, BarrierLaw, BarrierState, ContactForce, FrictionDerivative, SlipChange};
 use crate::linear::pattern::{ElementSlots, Pattern};
 use crate::rod::assembly::Increment;
 use crate::rod::configuration::node;
@@ -12,6 +12,8 @@ pub(super) struct BarrierTerm {
     state: BarrierState,
     nodes: Vec<Vec3>,
     velocities: Vec<Vec3>,
+    /// Change of the velocities that a correction makes.
+    change: Vec<Vec3>,
     /// Ends of the last path that was searched.
     path: [Vec<Vec3>; 2],
     stencils: Vec<Vec<usize>>,
@@ -31,6 +33,7 @@ impl BarrierTerm {
             state: law.state(),
             nodes: Vec::new(),
             velocities: Vec::new(),
+            change: Vec::new(),
             path: [Vec::new(), Vec::new()],
             stencils: Vec::new(),
             slots: Vec::new(),
@@ -46,13 +49,10 @@ impl BarrierTerm {
         exact && self.state.stencils().next().is_some()
     }
 
-    /// Takes the forces and directions of friction from the beginning of a step.
+    /// Prepares a step from these degrees of freedom.
     pub fn begin(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) {
         self.curvature = Curvature::Exact;
         self.place(law, node_dofs, q);
-        if law.lag(&mut self.state, &self.nodes) {
-            self.bound = false;
-        }
     }
 
     /// Multiplies the smoothing velocity of friction by a factor.
@@ -95,6 +95,7 @@ impl BarrierTerm {
         residual: &mut [f64],
     ) {
         self.place(law, node_dofs, q);
+        law.find_sliding(&mut self.state, &self.nodes);
         let state = &self.state;
         let spread = |element: usize, gradient: &[f64], out: &mut [f64]| {
             for (&node, part) in state.stencil(element).iter().zip(gradient.chunks_exact(3)) {
@@ -107,8 +108,14 @@ impl BarrierTerm {
             let rate = |dof: usize| increment.rate_of(dof, q[dof]);
             self.velocities.extend(node_dofs.iter().map(|&dof| Vec3::from_fn(|c, _| rate(dof + c))));
             let add = |element: usize, gradient: &[f64], _: Option<&[f64]>| spread(element, gradient, residual);
-            law.add_friction(&self.state, &self.velocities, false, add);
+            law.add_friction(&self.state, &self.nodes, &self.velocities, None, add);
         }
+    }
+
+    /// Energy at these degrees of freedom, J.
+    pub fn energy(&mut self, law: &BarrierLaw, node_dofs: &[usize], q: &[f64]) -> f64 {
+        self.place(law, node_dofs, q);
+        law.energy(&self.state, &self.nodes)
     }
 
     /// Whether all elements have their storage on the pattern they were bound to.
@@ -131,24 +138,48 @@ impl BarrierTerm {
         self.bound = true;
     }
 
+    /// Whether the derivative at the configuration of the last residual is symmetric: not where there is friction.
+    pub fn is_symmetric(&self, law: &BarrierLaw) -> bool {
+        self.curvature == Curvature::Definite || !law.slides(&self.state)
+    }
+
+    /// What the displacements `moved` (m), over which velocities change by `rate` of them, mean for contacts with friction: see
+    /// [`BarrierLaw::slip_change`].
+    pub fn slip_change(
+        &mut self,
+        law: &BarrierLaw,
+        node_dofs: &[usize],
+        (moved, rate): (&[f64], f64),
+        yielding: &[f64],
+        tolerance: f64,
+    ) -> SlipChange {
+        self.change.clear();
+        self.change.extend(node_dofs.iter().map(|&dof| node(moved, dof) * rate));
+        law.slip_change(&self.state, &self.velocities, &self.change, yielding, tolerance)
+    }
+
+    /// Whether friction acts at the configuration of the last residual.
+    pub fn slides(&self, law: &BarrierLaw) -> bool {
+        law.slides(&self.state)
+    }
+
     /// Adds the derivative at the configuration of the last residual; rows and columns of prescribed degrees of freedom are left out.
     pub fn add_matrix(&self, law: &BarrierLaw, rate: f64, prescribed: &[bool], values: &mut [f64]) {
         let mut free = [0.0; 144];
-        let mut store = |element: usize, matrix: Option<&[f64]>, factor: f64| {
+        let mut store = |element: usize, _: &[f64], matrix: Option<&[f64]>| {
             let (stencil, Some(matrix)) = (&self.stencils[element], matrix) else { return };
             let width = stencil.len();
             for (column, &j) in stencil.iter().enumerate() {
                 for (row, &i) in stencil.iter().enumerate() {
                     let k = row + width * column;
-                    free[k] = if prescribed[i] || prescribed[j] { 0.0 } else { factor * matrix[k] };
+                    free[k] = if prescribed[i] || prescribed[j] { 0.0 } else { matrix[k] };
                 }
             }
             self.slots[element].add(&free[..width * width], values);
         };
-        law.add(&self.state, &self.nodes, Some(self.curvature), |element, _, matrix| store(element, matrix, 1.0));
-        if law.has_friction() {
-            law.add_friction(&self.state, &self.velocities, true, |element, _, matrix| store(element, matrix, rate));
-        }
+        law.add(&self.state, &self.nodes, Some(self.curvature), &mut store);
+        let derivative = Some(FrictionDerivative { rate, curvature: self.curvature });
+        law.add_friction(&self.state, &self.nodes, &self.velocities, derivative, &mut store);
     }
 
     /// Part of the way from `from` to `to` over which no pair comes too close.

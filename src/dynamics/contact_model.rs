@@ -59,11 +59,15 @@ impl ContactModel {
                 );
                 Self::SpillmannTeschner(law)
             }
-            ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocity, spheres } => {
+            ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocities, spheres } => {
                 let bodies = Bodies::new(count, edges, radius, rest_lengths, colliding, spheres, exclusion);
-                let law = BarrierLaw::new(bodies, *tolerance, *stiffness);
-                let sliding = Friction { coefficient: *friction, smoothing_velocity: *slip_velocity };
-                Self::Barrier(if *friction > 0.0 { law.with_friction(sliding) } else { law })
+                let law = BarrierLaw::new(bodies, *tolerance, 1.0).with_stiffness(stiffness.clone());
+                let sliding = Friction { coefficient: *friction, smoothing_velocity: f64::INFINITY };
+                Self::Barrier(if *friction > 0.0 {
+                    law.with_friction(sliding).with_slip_velocities(slip_velocities.clone())
+                } else {
+                    law
+                })
             }
         }
     }

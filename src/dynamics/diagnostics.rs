@@ -6,6 +6,7 @@ use super::contact_model::ContactModel;
 use super::simulation::Simulation;
 use crate::Vec3;
 use crate::elastic::motors::Drive;
+use crate::elastic::signal::SignalError;
 use crate::fluid::FluidModel;
 use crate::fluid::product::FarFieldChoice;
 use crate::linear::LinearError;
@@ -53,13 +54,16 @@ impl Simulation {
     }
 
     /// Angular velocity of every motor over the last step, rad/s: the prescribed one, or that of the free angle.
-    pub fn motor_speeds(&self) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// What a motor's function of time fails with.
+    pub fn motor_speeds(&self) -> Result<Vec<f64>, SignalError> {
         self.model
             .motors
             .iter()
             .map(|motor| match &motor.drive {
-                Drive::Speed(signal) => signal.value(self.state.time).unwrap_or(f64::NAN),
-                Drive::Torque { dof, .. } => self.state.velocity[*dof],
+                Drive::Speed(signal) => signal.value(self.state.time),
+                Drive::Torque { dof, .. } => Ok(self.state.velocity[*dof]),
             })
             .collect()
     }
@@ -99,7 +103,7 @@ impl Simulation {
             false => None,
         };
         if let Some(fluid) = &mut stored {
-            fluid.update(&positions, self.balance.pool.as_deref())?;
+            fluid.update(&positions, self.balance.threads.pool().as_deref())?;
         } else {
             let mut ignored = super::statistics::Statistics::default();
             self.balance.place_fluid(&positions, &mut ignored)?;
@@ -135,7 +139,7 @@ impl Simulation {
         self.balance.place_fluid(&positions, &mut ignored)?;
         self.forget_fluid();
         let dofs = self.balance.fluid_dofs().to_vec();
-        let pool = self.balance.pool.clone();
+        let pool = self.balance.threads.pool();
         let Some(fluid) = self.balance.fluid_mut() else {
             return Ok(out);
         };

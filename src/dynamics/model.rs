@@ -1,8 +1,12 @@
 //! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
 
+use super::breaks::Breaks;
+use super::budget::{self, Account};
 use super::contact_model::{ContactModel, Overlap};
 use super::control::Control;
+use super::filaments::Filaments;
 use super::predictor::History;
+use super::round_off::RoundOff;
 use super::specification::{FlowSpecification, FluidModelSpecification, Frame, LoadKind, Specification};
 use super::state::State;
 use super::terms::{Inertia, Loads};
@@ -11,25 +15,27 @@ use crate::contact::potential::BarrierLaw;
 use crate::elastic::bending::Bending;
 use crate::elastic::hinges::Hinges;
 use crate::elastic::motors::{Drive, Motor};
+use crate::elastic::signal::SignalError;
 use crate::elastic::stretching::Stretching;
 use crate::elastic::twisting::Twisting;
 use crate::fluid::FluidModel;
-use crate::fluid::ambient::AmbientFlow;
-use crate::fluid::head::Head;
+use crate::fluid::ambient::{Ambient, AmbientFlow};
+use crate::fluid::head::{Head, MOST_EDGES};
 use crate::fluid::product::FarFieldChoice;
 use crate::fluid::rft::ResistiveForce;
 use crate::fluid::rss::StokesletSegments;
 use crate::fluid::twist_drag::TwistDrag;
 use crate::forces::follower::{FollowerForce, FollowerTorque};
-use crate::forces::inputs::Inputs;
+use crate::forces::inputs as load;
 use crate::forces::laboratory::{EdgeTorque, NodeForce};
 use crate::forces::magnetic::Magnetism;
 use crate::kinematics::clamp::{Clamp, ClampedEdge};
 use crate::linear::LinearError;
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{HingeElement, Term};
-use crate::rod::configuration::{Configuration, ReferenceFrames, ShaftAngle};
+use crate::rod::configuration::{Configuration, ShaftAngle};
 use crate::rod::network::{Network, NetworkError};
+use crate::rod::reference::ReferenceFrames;
 use std::f64::consts::PI;
 
 /// A model cannot be built from its specification.
@@ -84,16 +90,25 @@ pub struct Model {
     pub(super) motors: Vec<Motor>,
     pub(super) clamps: Vec<Clamp>,
     pub(super) prescribed: Vec<bool>,
+    pub(super) breaks: Breaks,
     pub(super) pattern: Pattern,
+    pub(super) filaments: Filaments,
     /// Turns residuals into forces: 1 for positions, one over a length for angles.
     pub(super) force_weight: Vec<f64>,
+    /// Turns errors of degrees of freedom into those relative to the size of a filament; 0 for what is prescribed.
+    pub(super) error_weight: Vec<f64>,
+    pub(super) round_off: RoundOff,
     pub(super) mass: Vec<f64>,
-    pub(super) stretching_scale: f64,
-    pub(super) bending_scale: f64,
-    pub(super) shortest_edge: f64,
     pub(super) contact: Option<ContactModel>,
-    pub(super) inputs: Inputs,
+    pub(super) inputs: load::Inputs,
     pub(super) flows: Vec<Box<dyn AmbientFlow>>,
+    /// Weights less buoyancy on every degree of freedom, N.
+    pub(super) weights: Vec<f64>,
+    /// Connected part of every node, and which parts nothing holds.
+    pub(super) part_of_node: Vec<usize>,
+    pub(super) free_parts: Vec<bool>,
+    /// Regularization of the immersed edges, m; zero for others.
+    pub(super) regularization: Vec<f64>,
     pub(super) specification: Specification,
 }
 
@@ -120,7 +135,7 @@ impl Model {
         let mass = masses(&specification, &network, dof_count, &rest.lengths);
         let mut inertia = Inertia::new(mass.clone());
         let mut dissipative = dissipative_terms(&specification, &network, dof_count, &rest.lengths);
-        let mut inputs = Inputs::default();
+        let mut inputs = load::Inputs::default();
         dissipative.extend(load_terms(&specification, &network, &rest.lengths, &mut inputs));
         let mut stencils: Vec<Vec<usize>> = stretching.stencils();
         stencils.extend(hinges.stencils());
@@ -131,18 +146,28 @@ impl Model {
         inertia.bind(&pattern);
         dissipative.iter_mut().for_each(|term| term.bind(&pattern));
 
-        let mean_length = rest.lengths.iter().sum::<f64>() / rest.lengths.len() as f64;
-        let total_length = rest.lengths.iter().sum::<f64>();
-        let mut force_weight = vec![1.0 / mean_length; dof_count];
-        network.node_dofs().iter().for_each(|&dof| force_weight[dof..dof + 3].fill(1.0));
         let (clamps, prescribed) = clamps(&specification, &network, dof_count);
-        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        let filaments = Filaments::new(&specification, &network, &stencils, &prescribed, &rest.lengths);
+        let force_weight = filaments.force_weights(&network);
+        let spin = spin_resistances(&specification, &rest.lengths);
+        let round_off = RoundOff::new(&specification, &network, dof_count, (&rest.lengths, &rest.voronoi), &spin);
         let contact = specification
             .contact
             .as_ref()
             .map(|contact| ContactModel::new(contact, &network, &rest.lengths, &specification.radius));
         let state = initial_state(&specification, &network, dof_count);
+        let held: Vec<bool> = (0..network.node_count()).map(|k| prescribed[network.node_dofs()[k]]).collect();
+        let (part_of_node, mut free_parts) = budget::parts(network.edges(), &held, contact.is_some());
+        let turned = network.edges().iter().zip(network.edge_dofs()).filter(|(_, dof)| prescribed[**dof]);
+        turned.for_each(|(&[i, _], _)| free_parts[part_of_node[i]] = false);
+        let turning = clamps.iter().filter(|clamp| !clamp.edges.is_empty()).map(|clamp| &clamp.motion.spin);
+        let others = clamps.iter().flat_map(|clamp| clamp.motion.shifts()).chain(inputs.signals());
         let model = Self {
+            breaks: Breaks::new(&motors, turning, others),
+            weights: weights(&specification, &network, dof_count, &rest.lengths),
+            part_of_node,
+            free_parts,
+            regularization: regularization(&specification),
             dof_count,
             stretching,
             hinges,
@@ -152,12 +177,11 @@ impl Model {
             clamps,
             prescribed,
             pattern,
-            force_weight,
             mass,
-            stretching_scale: largest(&mut specification.stretching.iter().copied()),
-            bending_scale: largest(&mut specification.bending.iter().map(|ei| ei[0][0].max(ei[1][1])))
-                / (total_length * total_length),
-            shortest_edge: rest.lengths.iter().copied().fold(f64::INFINITY, f64::min),
+            error_weight: filaments.error_weights(&force_weight),
+            filaments,
+            round_off,
+            force_weight,
             contact,
             network,
             inputs,
@@ -185,6 +209,11 @@ impl Model {
     /// Topology and numbering.
     pub fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// The parts that move on their own.
+    pub fn filaments(&self) -> &Filaments {
+        &self.filaments
     }
 
     /// Number of bodies that contact knows: edges, and with barrier contact spheres.
@@ -217,6 +246,16 @@ impl Model {
     /// Angles of all shafts.
     pub(super) fn shafts(&self, angles: &[f64], q: &[f64]) -> Vec<ShaftAngle> {
         self.motors.iter().zip(angles).map(|(motor, &angle)| motor.shaft(angle, q)).collect()
+    }
+
+    /// The background flow where the nodes are, if there is any.
+    pub(super) fn ambient(&self, nodes: &[Vec3], time: f64) -> Result<Option<Ambient>, SignalError> {
+        if self.flows.is_empty() {
+            return Ok(None);
+        }
+        let mut ambient = Ambient::default();
+        ambient.update(&self.flows, nodes, self.network.edges(), time)?;
+        Ok(Some(ambient))
     }
 
     /// A fresh drag model, with its own workspace.
@@ -284,6 +323,15 @@ fn check(specification: &Specification) -> Result<(), ModelError> {
     positive("radius", &specification.radius)?;
     positive("stretching", &specification.stretching)?;
     positive("twisting", &specification.twisting)?;
+    if !specification.reynolds.is_empty() {
+        expect("reynolds", specification.reynolds.len(), nodes)?;
+    }
+    if let Some(head) = &specification.head
+        && !(1..=MOST_EDGES).contains(&head.edges.len())
+    {
+        let (field, value) = ("head.edges".to_owned(), head.edges.len() as f64);
+        return Err(ModelError::Value { field, value, allowed: "1 to 6 edges fixed to the head" });
+    }
     for (k, ei) in specification.bending.iter().enumerate() {
         let determinant = ei[0][0] * ei[1][1] - ei[0][1] * ei[1][0];
         if !(ei[0][0] > 0.0 && determinant > 0.0 && ei[0][1] == ei[1][0]) {
@@ -375,6 +423,7 @@ fn initial_state(specification: &Specification, network: &Network, dof_count: us
         tensions: vec![0.0; network.edges().len()],
         motor_angles: vec![0.0; specification.motors.len()],
         contacts: Vec::new(),
+        account: Account::default(),
         contact_anchor: Vec::new(),
     }
 }
@@ -426,6 +475,15 @@ fn masses(specification: &Specification, network: &Network, dof_count: usize, le
     mass
 }
 
+/// Resistance of every edge to spinning about its centreline, N m s.
+fn spin_resistances(specification: &Specification, lengths: &[f64]) -> Vec<f64> {
+    let Some(fluid) = specification.fluid.as_ref().filter(|fluid| fluid.twist_drag) else {
+        return vec![0.0; lengths.len()];
+    };
+    let resistance = |edge: usize| 4.0 * PI * fluid.viscosity * specification.radius[edge].powi(2) * lengths[edge];
+    (0..lengths.len()).map(|edge| if fluid.immersed[edge] { resistance(edge) } else { 0.0 }).collect()
+}
+
 fn dissipative_terms(
     specification: &Specification,
     network: &Network,
@@ -435,16 +493,15 @@ fn dissipative_terms(
     let mut terms: Vec<Box<dyn Term>> = Vec::new();
     if let Some(fluid) = specification.fluid.as_ref().filter(|fluid| fluid.twist_drag) {
         let edges: Vec<usize> = (0..network.edges().len()).filter(|&edge| fluid.immersed[edge]).collect();
-        let coefficients = edges
-            .iter()
-            .map(|&edge| 4.0 * PI * fluid.viscosity * specification.radius[edge].powi(2) * lengths[edge])
-            .collect();
+        let spin = spin_resistances(specification, lengths);
+        let coefficients = edges.iter().map(|&edge| spin[edge]).collect();
         if !edges.is_empty() {
             terms.push(Box::new(TwistDrag::new(network, edges, coefficients)));
         }
     }
     if let Some(head) = &specification.head {
-        terms.push(Box::new(Head::new(network, head.node, head.neighbours, head.translation, head.rotation)));
+        let drag = [head.translation, head.rotation];
+        terms.push(Box::new(Head::new(network, head.node, head.edges.clone(), lengths, drag)));
     }
     let forces = weights(specification, network, dof_count, lengths);
     if forces.iter().any(|&force| force != 0.0) {
@@ -453,6 +510,19 @@ fn dissipative_terms(
     terms
 }
 
+/// Regularization of every immersed edge, m, and zero for dry ones and other models.
+fn regularization(specification: &Specification) -> Vec<f64> {
+    let mut out = vec![0.0; specification.edges.len()];
+    if let Some(fluid) = &specification.fluid
+        && let FluidModelSpecification::StokesletSegments { epsilon, .. } = &fluid.model
+    {
+        let wet = fluid.immersed.iter().zip(epsilon);
+        out.iter_mut().zip(wet).for_each(|(out, (&wet, &epsilon))| *out = if wet { epsilon } else { 0.0 });
+    }
+    out
+}
+
+/// Weight less buoyancy on every degree of freedom, N.
 fn weights(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
     let mut forces = vec![0.0; dof_count];
     let mut add = |node: usize, force: Vec3| {
@@ -504,7 +574,7 @@ fn load_terms(
     specification: &Specification,
     network: &Network,
     lengths: &[f64],
-    inputs: &mut Inputs,
+    inputs: &mut load::Inputs,
 ) -> Vec<Box<dyn Term>> {
     let mut terms: Vec<Box<dyn Term>> = Vec::new();
     for load in &specification.loads {

@@ -1,17 +1,20 @@
 //! Newton's method with line search on the force balance of a step.
 
-use super::balance::{Balance, Size, Step, Unknowns};
+use super::balance::{Balance, Step, Unknowns};
 use super::model::Model;
+use super::solve::Correction;
 use super::statistics::Statistics;
+use super::targets::Size;
 use crate::linear::LinearError;
+use crate::rod::fault::fault;
 
 /// Where Newton's method stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Goal {
-    /// Largest residual force, relative to the largest force in the balance: forces and torques then balance that well.
+    /// Largest residual force, relative to the largest force on the same filament: forces and torques then balance that well.
     Residual(f64),
-    /// Largest displacement, m, by which the solution is still to be corrected. Tensions may then be off by the axial stiffness
-    /// times a strain that no one can see, as long as the nodes are where they should be.
+    /// Largest displacement, relative to the size of its filament, by which the solution is still to be corrected. Tensions may
+    /// then be off by the axial stiffness times a strain that no one can see, as long as the nodes are where they should be.
     Displacement(f64),
 }
 
@@ -34,7 +37,7 @@ impl Default for NewtonSettings {
 pub(super) struct NewtonFailure {
     pub residual: f64,
     pub iterations: usize,
-    pub worst: usize,
+    pub worst: Option<usize>,
     pub reason: String,
 }
 
@@ -45,6 +48,9 @@ const LINEAR_SHARE: f64 = 0.1;
 /// Loosest linear system, by goal: a residual that is to fall to its target, a correction that is to fall below its own.
 const LOOSEST: f64 = 1e-2;
 const LOOSEST_CORRECTION: f64 = 0.1;
+/// Change of a sliding velocity, over the larger of itself and the smoothing velocity, that may be left: where friction has
+/// turned over, the change that is asked for is half the smoothing velocity or more.
+const SLIP_SHARE: f64 = 0.1;
 /// How often, and by how much, the correction may grow under full steps.
 const UPHILL_ITERATIONS: usize = 3;
 const UPHILL: f64 = 2.0;
@@ -63,9 +69,10 @@ pub(super) fn solve(
     unknowns: &mut Unknowns,
     statistics: &mut Statistics,
 ) -> Result<(), NewtonFailure> {
+    balance.aim(model, step, settings.goal, &unknowns.q);
     let mut newton = Newton { balance, model, step, work, unknowns, statistics };
     match settings.goal {
-        Goal::Residual(tolerance) => newton.reduce_residual(tolerance, settings.max_iterations),
+        Goal::Residual(_) => newton.reduce_residual(settings.max_iterations),
         Goal::Displacement(tolerance) => newton.reduce_correction(tolerance, settings.max_iterations),
     }
 }
@@ -74,7 +81,7 @@ fn failure(size: Option<Size>, iterations: usize, reason: &str) -> NewtonFailure
     NewtonFailure {
         residual: size.map_or(f64::NAN, |size| size.norm),
         iterations,
-        worst: size.map_or(0, |size| size.worst),
+        worst: size.map(|size| size.worst),
         reason: reason.to_owned(),
     }
 }
@@ -92,7 +99,18 @@ struct Newton<'a, 'b> {
 impl Newton<'_, '_> {
     fn evaluate_start(&mut self) -> Result<Size, NewtonFailure> {
         let size = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
-        size.ok_or_else(|| failure(None, 0, "the guess is not a configuration"))
+        size.ok_or_else(|| {
+            let fault = fault(&self.model.network, &self.unknowns.q);
+            let reason = fault.as_ref().map_or("forces are too large to be numbers", |fault| fault.what);
+            let worst = fault.map(|fault| self.model.network.node_dofs()[fault.node]);
+            NewtonFailure { worst, ..failure(None, 0, reason) }
+        })
+    }
+
+    /// An error if the caller wants to stop.
+    fn go_on(&mut self, size: Size, iteration: usize) -> Result<(), NewtonFailure> {
+        let stopped = self.balance.interrupt.requested();
+        if stopped { Err(failure(Some(size), iteration, "interrupted")) } else { Ok(()) }
     }
 
     /// Residual at the given part of the direction.
@@ -121,33 +139,31 @@ impl Newton<'_, '_> {
         self.balance.direction(self.model, self.step, tensions, tolerance, &mut self.work.direction, self.statistics)
     }
 
-    fn correction(&mut self) -> Result<f64, LinearError> {
-        self.balance.correction(self.model, self.step, self.statistics)
+    fn correction(&mut self, tolerance: f64) -> Result<Correction, LinearError> {
+        self.balance.correction(self.model, self.step, tolerance, self.statistics)
     }
 
-    fn reduce_residual(&mut self, tolerance: f64, max_iterations: usize) -> Result<(), NewtonFailure> {
-        let floor = round_off(self.balance, self.model, self.step, &self.unknowns.q);
-        let least = 1e-8 * self.model.bending_scale;
-        let target = |size: &Size| (tolerance * size.scale.max(least)).max(floor);
+    fn reduce_residual(&mut self, max_iterations: usize) -> Result<(), NewtonFailure> {
         let mut size = self.evaluate_start()?;
         for iteration in 0..max_iterations {
-            let target = target(&size);
-            if size.norm <= target {
+            self.go_on(size, iteration)?;
+            if size.excess <= 1.0 {
                 return Ok(());
             }
-            let linear = (LINEAR_SHARE * target / size.norm).clamp(LINEAR_TOLERANCE, LOOSEST);
+            let merit = self.balance.weigh(self.model);
+            let linear = (LINEAR_SHARE / size.excess).clamp(LINEAR_TOLERANCE, LOOSEST);
             self.linearize()
                 .and_then(|()| self.find_direction(linear))
                 .map_err(|error| failure(Some(size), iteration, &error.to_string()))?;
             let mut length = self.full_length();
             let lower = (0..BACKTRACKS).find_map(|_| {
-                let sufficient = (1.0 - 1e-4 * length) * size.merit;
+                let sufficient = (1.0 - 1e-4 * length) * merit;
                 let trial = self.try_length(length).filter(|trial| trial.merit < sufficient);
                 length *= 0.5;
                 trial
             });
             let Some(lower) = lower else {
-                if size.norm <= STAGNATION * target {
+                if size.excess <= STAGNATION {
                     // The configuration is left at the last trial: bring it back to the accepted point.
                     let _ = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
                     return Ok(());
@@ -161,7 +177,7 @@ impl Newton<'_, '_> {
             self.accept();
             size = lower;
         }
-        if size.norm <= STAGNATION * target(&size) {
+        if size.excess <= STAGNATION {
             return Ok(());
         }
         Err(failure(Some(size), max_iterations, "too many iterations"))
@@ -171,13 +187,17 @@ impl Newton<'_, '_> {
     /// and of soft directions then count alike (the natural level function of Deuflhard, Newton Methods, 2004, section 3.3).
     fn reduce_correction(&mut self, tolerance: f64, max_iterations: usize) -> Result<(), NewtonFailure> {
         let mut size = self.evaluate_start()?;
+        self.balance.weigh(self.model);
         for iteration in 0..max_iterations {
+            self.go_on(size, iteration)?;
             let broken = |error: LinearError| failure(Some(size), iteration, &error.to_string());
             self.linearize().map_err(broken)?;
-            let correction = self.correction().map_err(broken)?;
-            if correction <= tolerance {
+            let correction = self.correction(tolerance).map_err(broken)?;
+            if correction.is_done(tolerance) {
+                self.polish();
                 return Ok(());
             }
+            let correction = correction.size(tolerance);
             let linear = (LINEAR_SHARE * tolerance / correction).clamp(LINEAR_TOLERANCE, LOOSEST_CORRECTION);
             self.find_direction(linear).map_err(broken)?;
             let full = self.full_length();
@@ -188,8 +208,9 @@ impl Newton<'_, '_> {
                 let sufficient = uphill * correction;
                 let trial = self.try_length(length);
                 length *= 0.5;
-                let left = self.correction().ok()?;
-                trial.filter(|_| left < sufficient.max(tolerance)).map(|trial| (trial, left))
+                let left = self.correction(tolerance).ok()?;
+                let better = left.is_done(tolerance) || left.size(tolerance) < sufficient;
+                trial.filter(|_| better).map(|trial| (trial, left))
             });
             let Some((trial, left)) = lower else {
                 if self.balance.define_contact() {
@@ -200,11 +221,42 @@ impl Newton<'_, '_> {
             };
             self.accept();
             size = trial;
-            if left <= tolerance {
+            if left.is_done(tolerance) {
+                self.polish();
                 return Ok(());
             }
         }
         Err(failure(Some(size), max_iterations, "too many iterations"))
+    }
+
+    /// Makes the correction that was measured last, which is small enough to be left: it is at hand, and with it the forces
+    /// balance far better. Strains that no one can see are tensions and torques that everyone can read.
+    fn polish(&mut self) {
+        let Self { balance, model, step, work, unknowns, .. } = self;
+        if balance.last_correction(model, step, &unknowns.tensions, &mut work.direction).is_err() {
+            return;
+        }
+        work.try_length(unknowns, 1.0);
+        let free = balance.step_limit(model, &unknowns.q, &work.trial.q, self.statistics) >= 1.0;
+        if free && balance.place(model, step, &work.trial.q) {
+            std::mem::swap(*unknowns, &mut work.trial);
+        } else {
+            // The configuration goes back to what is kept.
+            balance.place(model, step, &unknowns.q);
+        }
+    }
+}
+
+impl Correction {
+    /// Whether neither displacements nor sliding velocities still matter. While a contact sticks, displacements are small however
+    /// large the force is that should make it slide: they alone do not tell.
+    fn is_done(&self, tolerance: f64) -> bool {
+        self.length <= tolerance && self.slip.relative <= SLIP_SHARE
+    }
+
+    /// One measure of both, linear in the correction: what the line search reduces.
+    fn size(&self, tolerance: f64) -> f64 {
+        self.length.max(tolerance * self.slip.over_smoothing / SLIP_SHARE)
     }
 }
 
@@ -229,17 +281,4 @@ impl NewtonWork {
         move_along(&mut self.trial.density, &from.density, &self.direction.density);
         move_along(&mut self.trial.tensions, &from.tensions, &self.direction.tensions);
     }
-}
-
-/// Round-off of a nodal force: positions are exact to `u |x|`, strains to `u |x| / l`, tensions to EA times that; inertia
-/// and drag multiply differences of positions by masses and resistances over powers of the step.
-fn round_off(balance: &Balance, model: &Model, step: &Step, q: &[f64]) -> f64 {
-    let farthest = model
-        .network
-        .node_dofs()
-        .iter()
-        .flat_map(|&dof| q[dof..dof + 3].iter())
-        .fold(0.0, |far: f64, x| far.max(x.abs()));
-    let tension = model.stretching_scale * (1.0 + farthest / model.shortest_edge);
-    2.0 * f64::EPSILON * (tension + balance.largest_stiffness(model, step) * farthest)
 }

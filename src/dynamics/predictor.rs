@@ -1,10 +1,10 @@
 //! Past states: extrapolated to the guess Newton's method starts from, differenced to rates, interpolated for output.
 
 /// Past states kept besides the present one: extrapolation of third order and the error estimate of the order above.
-const DEPTH: usize = 4;
+pub(super) const DEPTH: usize = 4;
 
 /// Highest order of the guess for Newton's method.
-const GUESS_ORDER: usize = 3;
+pub(super) const GUESS_ORDER: usize = 3;
 
 /// What is remembered of an accepted state.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -76,20 +76,19 @@ impl History {
         self.order.min(self.past.len())
     }
 
-    /// Errors `max |q - extrapolation| / weight` with which each order would have predicted an accepted state.
-    ///
-    /// `force_weight` turns a residual into a force; its inverse turns a degree of freedom into a length.
+    /// Errors `max weight |q - extrapolation|` with which each order would have predicted an accepted state: relative to the size
+    /// of the filament, with the weights of the model.
     pub fn prediction_errors(
         &self,
         (now, old): (f64, &[f64]),
         (to, new): (f64, &[f64]),
-        force_weight: &[f64],
+        weights: &[f64],
         work: &mut [f64],
     ) -> Vec<f64> {
         (0..=self.past.len())
             .map(|order| {
                 self.extrapolate(order, (now, old), |sample| &sample.q, to, work);
-                (0..new.len()).map(|k| (work[k] - new[k]).abs() / force_weight[k]).fold(0.0, f64::max)
+                (0..new.len()).map(|k| (work[k] - new[k]).abs() * weights[k]).fold(0.0, f64::max)
             })
             .collect()
     }

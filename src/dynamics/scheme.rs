@@ -36,6 +36,12 @@ impl Scheme {
         self != Self::Overdamped
     }
 
+    /// Highest order of the backward differences: that of third order is not stable for oscillations without damping, which
+    /// inertia allows.
+    pub fn highest_order(self) -> usize {
+        if self.has_inertia() { 2 } else { super::control::HIGHEST_ORDER }
+    }
+
     /// Whether the fluid resists the new velocities.
     pub fn fluid_is_implicit(self) -> bool {
         self != Self::Explicit

@@ -4,23 +4,24 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::balance::{Balance, Drives, Step, Unknowns};
+use super::budget::Accepted;
 use super::contact_model::ContactModel;
-use super::control::Control;
+use super::control::{Control, Estimate};
 use super::failure::{StepError, TryError};
+use super::inputs::Inputs;
+use super::interrupt::Hook;
 use super::model::{Model, ModelError};
 use super::newton::{self, Goal, NewtonSettings, NewtonWork};
 use super::predictor::{History, Sample};
+use super::progress::Progress;
 use super::scheme::Scheme;
 use super::specification::Specification;
 use super::state::State;
 use super::statistics::Statistics;
-use super::threads;
+use super::threads::Threads;
 use crate::Vec3;
 use crate::contact::spillmann::ContactSolver;
-use crate::elastic::motors::Drive;
-use crate::fluid::ambient::Ambient;
-use crate::forces::outside::{ForceFunction, OutsideForce, Surroundings};
-use crate::rod::configuration::{Configuration, ReferenceFrames, node};
+use crate::forces::outside::{ForceFunction, OutsideForce};
 
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
@@ -31,6 +32,9 @@ const WIDENINGS: [f64; 5] = [1024.0, 128.0, 16.0, 4.0, 1.0];
 /// How often a step may be halved.
 const HALVINGS: u32 = 12;
 
+/// What motors, clamps, loads and a caller's function do over a step.
+type Prepared = (Inputs, Option<Arc<OutsideForce>>);
+
 /// A model, its state, and the workspace that takes it forward.
 pub struct Simulation {
     pub(super) model: Model,
@@ -39,18 +43,19 @@ pub struct Simulation {
     pub(super) scheme: Scheme,
     pub(super) dt: f64,
     pub(super) settings: NewtonSettings,
-    work: NewtonWork,
+    pub(super) work: NewtonWork,
     contact: Option<ContactSolver>,
     pub(super) statistics: Statistics,
     fluid_step: Option<u64>,
     trial: Unknowns,
     extrapolated: Vec<f64>,
     pub(super) tolerance: Option<f64>,
-    force: Option<ForceFunction>,
+    pub(super) force: Option<ForceFunction>,
     /// What the function gave for the step with this number: a step that is tried again sees the same.
-    given: Option<(u64, Arc<OutsideForce>)>,
+    pub(super) given: Option<(u64, Arc<OutsideForce>)>,
     positions: Vec<Vec3>,
     stiffness: Vec<f64>,
+    pub(super) progress: Progress,
 }
 
 impl Simulation {
@@ -63,8 +68,7 @@ impl Simulation {
         if let Some(overlap) = model.overlap(&state) {
             return Err(ModelError::Overlap(overlap));
         }
-        let pool = threads::pool(thread_count);
-        let balance = Balance::new(&model, pool.as_ref().map(Arc::clone))?;
+        let balance = Balance::new(&model, Threads(thread_count))?;
         let contact = model.contact.as_ref().and_then(ContactModel::spillmann).map(ContactSolver::new);
         let mut state = state;
         state.density = balance.zero_density(scheme);
@@ -78,6 +82,7 @@ impl Simulation {
             extrapolated: state.q.clone(),
             positions: state.positions(&model.network),
             stiffness: Vec::new(),
+            progress: Progress::default(),
             settings: NewtonSettings::default(),
             statistics: Statistics::default(),
             fluid_step: None,
@@ -134,13 +139,19 @@ impl Simulation {
         self.state = state;
         self.fluid_step = None;
         self.given = None;
+        self.progress = Progress::from(self.statistics.newton_iterations, self.state.time);
     }
 
     /// As [`Self::restore`], for a state from elsewhere.
     ///
     /// # Errors
-    /// [`ModelError::Overlap`] if barrier contact cannot go on from there; the present state is then kept.
+    /// As [`State::check`]; [`ModelError::Shape`] if it is not a configuration; [`ModelError::Overlap`] if barrier contact
+    /// cannot go on from there. The present state is then kept.
     pub fn adopt(&mut self, state: State) -> Result<(), ModelError> {
+        state.check(&self.model, &self.state)?;
+        if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
+            return Err(ModelError::Shape { shape: "nodes" });
+        }
         if let Some(overlap) = self.model.overlap(&state).filter(|_| self.model.barrier().is_some()) {
             return Err(ModelError::Overlap(overlap));
         }
@@ -169,10 +180,8 @@ impl Simulation {
         state.contact_anchor.clear();
         state.contacts.clear();
         state.control = Control::default();
-        rebase(&mut state.frames, network.edges(), nodes);
-        if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
-            return Err(ModelError::Shape { shape: "nodes" });
-        }
+        state.account = super::budget::Account::default();
+        state.frames.follow_turned_over(network, nodes);
         self.adopt(state)
     }
 
@@ -199,9 +208,13 @@ impl Simulation {
             if left <= 0.5 * smallest {
                 break Ok(());
             }
+            if let Err(stalled) = self.check_progress() {
+                break Err(stalled);
+            }
             let dt = part.min(left);
             match self.try_step(dt, 1) {
                 Ok(_) => left -= dt,
+                Err(TryError::Interrupted) => break Err(StepError::Interrupted),
                 Err(TryError::Signal(error)) => break Err(StepError::Signal(error)),
                 Err(TryError::Solve { residual, iterations, worst, reason }) => {
                     self.statistics.rejected_steps += 1;
@@ -225,20 +238,24 @@ impl Simulation {
         dt: f64,
         residual: f64,
         iterations: usize,
-        worst: usize,
+        worst: Option<usize>,
         reason: String,
     ) -> StepError {
         let smallest_gap = self.smallest_gap().unwrap_or(f64::INFINITY);
         let dofs = self.model.network.node_dofs();
+        let advice = match self.tolerance {
+            None => "a smaller dt, or rtol in its place, may help",
+            Some(_) => "a finer mesh there, a slower drive or a smaller rtol may help",
+        };
         StepError::Convergence {
             time: self.state.time,
             step: self.state.steps,
             dt,
-            residual,
+            residual: Some(residual).filter(|residual| residual.is_finite()),
             iterations,
             smallest_gap,
-            worst_node: dofs.partition_point(|&dof| dof <= worst).saturating_sub(1),
-            reason,
+            worst_node: worst.map(|worst| dofs.partition_point(|&dof| dof <= worst).saturating_sub(1)),
+            reason: format!("{reason}; {advice}"),
         }
     }
 
@@ -247,83 +264,76 @@ impl Simulation {
         // Forces of a step's beginning are right to first order, and only the first order's estimate sees what they leave out.
         let order = if self.force.is_some() { 1 } else { order.min(self.state.history.past.len() + 1) };
         let (t0, t1) = (self.state.time, self.state.time + dt);
+        self.balance.interrupt.begin();
         let mut trial = std::mem::take(&mut self.trial);
+        self.open_account();
         let prepared = self.prepare(&mut trial, t0, t1);
-        let solved = prepared.and_then(|drives| self.solve(drives, dt, order, &mut trial));
+        let solved = prepared.and_then(|(inputs, outside)| {
+            let Inputs { angles, torques, loads, departure, impulses, load_impulses, .. } = inputs;
+            let drives = Drives { motor_angles: angles, motor_torques: torques, inputs: loads, ambient: None, outside };
+            let drives = self.solve(drives, dt, order, &mut trial)?;
+            Ok((drives, departure, impulses, load_impulses))
+        });
         self.trial = trial;
-        let angles = solved?;
+        if self.balance.interrupt.stopped() {
+            return Err(self.interrupted());
+        }
+        let (drives, departure, impulses, load_impulses) = solved?;
         let missed = self.state.history.prediction_errors(
             (t0, &self.state.q),
             (t1, &self.trial.q),
-            &self.model.force_weight,
+            &self.model.error_weight,
             &mut self.extrapolated,
         );
         let mut accepted = true;
         if let Some(tolerance) = self.tolerance {
             let times = self.state.history.times(t0, usize::MAX);
-            let control = Control { dt, order };
-            (self.state.control, accepted) = control.judge(&times, t1, &missed, tolerance);
+            let control = Control { order, ..self.state.control };
+            let mut unseen = departure / self.angle_tolerance() * tolerance;
+            for (dof, impulse) in impulses {
+                unseen = unseen.max(self.balance.response(&self.model, dof)? * impulse / dt);
+            }
+            for (channel, impulse) in load_impulses {
+                unseen = unseen.max(self.balance.response_to_load(&self.model, channel)? * impulse / dt);
+            }
+            let highest_order = if self.force.is_some() { 1 } else { self.scheme.highest_order() };
+            let estimate = Estimate { missed: &missed, unseen, tolerance, highest_order };
+            (self.state.control, accepted) = control.judge(&times, t1, &estimate);
         }
         if accepted {
-            self.accept(angles, dt, order, &missed);
+            self.accept(drives, dt, order, &missed);
         }
         Ok(accepted)
     }
 
-    /// Asks a function for forces at the beginning of every step.
-    pub fn set_force(&mut self, force: Option<ForceFunction>) {
-        self.force = force;
-        self.given = None;
+    /// Back to the last good state, as if the step had not been tried.
+    fn interrupted(&mut self) -> TryError {
+        self.restore(self.state.clone());
+        TryError::Interrupted
     }
 
-    fn outside_force(&mut self) -> Result<Option<Arc<OutsideForce>>, TryError> {
-        let Some(force) = &self.force else { return Ok(None) };
-        if let Some((_, given)) = self.given.as_ref().filter(|(steps, _)| *steps == self.state.steps) {
-            return Ok(Some(Arc::clone(given)));
-        }
-        let (network, state) = (&self.model.network, &self.state);
-        let mut configuration = Configuration::new(network, self.model.dof_count);
-        configuration.update(network, &state.q, &state.frames, &self.model.shafts(&state.motor_angles, &state.q));
-        let directors = (0..network.edges().len()).map(|edge| {
-            let [m1, m2] = configuration.material(edge);
-            [m1, m2, configuration.tangent(edge)]
-        });
-        let given = force(&Surroundings {
-            time: state.time,
-            nodes: state.positions(network),
-            velocities: network.node_dofs().iter().map(|&dof| node(&state.velocity, dof)).collect(),
-            directors: directors.collect(),
-        })?;
-        let outside = Arc::new(OutsideForce::new(network, &configuration, &given)?);
-        self.given = Some((state.steps, Arc::clone(&outside)));
-        Ok(Some(outside))
+    /// Sets what is asked every 50 ms of a step whether to give it up; `None` lets every step come to its end.
+    pub fn set_interrupt(&mut self, hook: Option<Hook>) {
+        self.balance.interrupt.set(hook);
     }
 
-    /// Motor angles and torques at the end of the step; the guess, with the prescribed degrees of freedom set.
-    fn prepare(&mut self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<Drives, TryError> {
+    /// What drives the step; the guess, with the prescribed degrees of freedom set.
+    fn prepare(&mut self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<Prepared, TryError> {
         let outside = self.outside_force()?;
-        let mut angles = self.state.motor_angles.clone();
-        let mut torques = vec![0.0; angles.len()];
-        for (k, motor) in self.model.motors.iter().enumerate() {
-            match &motor.drive {
-                Drive::Speed(signal) => angles[k] += signal.integral(t0, t1)?,
-                Drive::Torque { signal, .. } => torques[k] = signal.value(t1)?,
-            }
-        }
+        let inputs = Inputs::new(&self.model, &self.state.motor_angles, (t0, t1))?;
         let state = &self.state;
         let order = state.history.guess_order();
         state.history.extrapolate(order, (t0, &state.q), |sample| &sample.q, t1, &mut guess.q);
         state.history.extrapolate(order, (t0, &state.density), |sample| &sample.density, t1, &mut guess.density);
         guess.tensions.copy_from_slice(&state.tensions);
-        for clamp in &self.model.clamps {
-            clamp.advance((t0, &state.q), &state.frames, t1, &mut guess.q)?;
+        for (clamp, turn) in self.model.clamps.iter().zip(&inputs.turns) {
+            clamp.advance((t0, &state.q), &state.frames, (t1, *turn), &mut guess.q)?;
         }
-        let inputs = self.model.inputs.values(t1)?;
-        Ok(Drives { motor_angles: angles, motor_torques: torques, inputs, ambient: None, outside })
+        Ok((inputs, outside))
     }
 
-    /// Solves the step from the guess, contact included; the motor angles at its end.
-    fn solve(&mut self, mut drives: Drives, dt: f64, order: usize, trial: &mut Unknowns) -> Result<Vec<f64>, TryError> {
+    /// Solves the step from the guess, contact included; what has driven it.
+    fn solve(&mut self, mut drives: Drives, dt: f64, order: usize, trial: &mut Unknowns) -> Result<Drives, TryError> {
         let Self { model, state, balance, scheme, settings, work, contact, statistics, positions, stiffness, .. } =
             self;
         let dofs = model.network.node_dofs();
@@ -344,14 +354,10 @@ impl Simulation {
             balance.place_fluid(positions, statistics)?;
             self.fluid_step = Some(state.steps);
         }
-        if !model.flows.is_empty() {
-            if order == 1 {
-                place(&state.q, positions);
-            }
-            let mut ambient = Ambient::default();
-            ambient.update(&model.flows, positions, model.network.edges(), state.time + dt)?;
-            drives.ambient = Some(ambient);
+        if order == 1 && !model.flows.is_empty() {
+            place(&state.q, positions);
         }
+        drives.ambient = model.ambient(positions, state.time + dt)?;
         let step = Step::new(*scheme, state, dt, order, drives);
         balance.begin(model, &step, statistics)?;
         let failed = |failure: newton::NewtonFailure| TryError::Solve {
@@ -379,7 +385,7 @@ impl Simulation {
                 balance.widen_friction(1.0);
             }
             solved.map_err(failed)?;
-            return Ok(step.motor_angles);
+            return Ok(step.into_drives());
         };
         contact.begin(&state.contacts);
         balance.node_stiffness(model, &step, stiffness);
@@ -404,24 +410,45 @@ impl Simulation {
             statistics.contact_iterations += u64::from(loaded || pass.pushing > 0);
             violation = pass.violation;
             if violation <= law.tolerance() && settled {
-                return Ok(step.motor_angles);
+                return Ok(step.into_drives());
             }
             settled = violation <= law.tolerance();
         }
         Err(TryError::Solve {
             residual: f64::NAN,
             iterations: law.max_iterations(),
-            worst: 0,
+            worst: None,
             reason: format!("contact left an overlap of {violation:.2e} of the sum of radii"),
         })
     }
 
-    fn accept(&mut self, angles: Vec<f64>, dt: f64, order: usize, missed: &[f64]) {
-        let step = Step::new(self.scheme, &self.state, dt, order, Drives::default());
+    /// Begins the account of energies at the present state, if none has begun.
+    fn open_account(&mut self) {
+        let Self { state, balance, model, scheme, .. } = self;
+        if state.account.start.is_none() && balance.energies(model, state).is_some() {
+            let stored = balance.stored(model, &state.q, &state.velocity, scheme.has_inertia());
+            state.account.begin(state.time, stored);
+        }
+    }
+
+    fn accept(&mut self, drives: Drives, dt: f64, order: usize, missed: &[f64]) {
+        let step = Step::new(self.scheme, &self.state, dt, order, drives);
         let increment = step.increment();
         let velocity: Vec<f64> =
             self.trial.q.iter().enumerate().map(|(dof, &value)| increment.rate_of(dof, value)).collect();
+        let account = self.balance.account(&Accepted {
+            model: &self.model,
+            step: &step,
+            q: &self.trial.q,
+            velocity: &velocity,
+            density: &self.trial.density,
+            motor_angles: &step.motor_angles,
+            dt,
+            order,
+        });
+        let angles = step.into_drives().motor_angles;
         let state = &mut self.state;
+        state.account = account;
         let replaced = Sample {
             time: state.time,
             q: std::mem::replace(&mut state.q, self.trial.q.clone()),
@@ -466,7 +493,7 @@ fn keep_apart(
     let prescribed = model.prescribed.iter().zip(start.iter_mut().zip(&*guess));
     prescribed.filter(|(held, _)| **held).for_each(|(_, (start, end))| *start = *end);
     let blocked =
-        |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: 0, reason: reason.to_owned() };
+        |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: None, reason: reason.to_owned() };
     if balance.step_limit(model, from, &start, statistics) < 1.0 {
         return Err(blocked("what is prescribed moves filaments into each other"));
     }
@@ -475,17 +502,4 @@ fn keep_apart(
         guess.iter_mut().zip(&start).for_each(|(guess, start)| *guess = start + limit * (*guess - start));
     }
     Ok(())
-}
-
-/// Gives edges that have turned over completely since the reference a reference of their own: transport from
-/// antiparallel tangents is not unique.
-fn rebase(frames: &mut ReferenceFrames, edges: &[[usize; 2]], nodes: &[Vec3]) {
-    for (k, &[i, j]) in edges.iter().enumerate() {
-        let vector = nodes[j] - nodes[i];
-        let t = vector / vector.norm();
-        if 1.0 + frames.tangents[k].dot(&t) < 1e-4 {
-            frames.directors[k] = crate::rod::frames::transport_through(&frames.directors[k], &frames.tangents[k], &t);
-            frames.tangents[k] = t;
-        }
-    }
 }

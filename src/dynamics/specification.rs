@@ -1,5 +1,6 @@
 //! What a scene says, as plain data in SI units; the scene's description in Python fills it in.
 
+use crate::contact::stiffness::Stiffness;
 use crate::elastic::signal::Signal;
 use crate::fluid::ambient::AmbientFlow;
 use crate::fluid::ambient::function::{FlowFunction, GivenFlow};
@@ -22,13 +23,13 @@ pub struct MotorSpecification {
     pub signal: Signal,
 }
 
-/// The seed's head.
-#[derive(Debug, Clone, Copy)]
+/// The robot's head.
+#[derive(Debug, Clone)]
 pub struct HeadSpecification {
     /// Its node.
     pub node: usize,
-    /// The nodes before and after it.
-    pub neighbours: [usize; 2],
+    /// The edges at that node that are fixed to it, one to [`crate::fluid::head::MOST_EDGES`].
+    pub edges: Vec<usize>,
     /// `C_t 6 pi mu r_h`, N s/m.
     pub translation: f64,
     /// `C_r 8 pi mu r_h^3`, N m s.
@@ -96,12 +97,12 @@ pub enum ContactMethodSpecification {
     Barrier {
         /// Tolerance `delta`: contact acts between `1 - delta` and `1 + delta` sums of radii.
         tolerance: f64,
-        /// Stiffness, Pa.
-        stiffness: f64,
+        /// Stiffness of every pair.
+        stiffness: Stiffness,
         /// Coefficient of friction.
         friction: f64,
-        /// Velocity from which on contacts slide, m/s.
-        slip_velocity: f64,
+        /// Velocity from which on contacts of every body, edges before spheres, slide, m/s; the larger of two counts.
+        slip_velocities: Vec<f64>,
         /// Node and radius (m) of every sphere.
         spheres: Vec<(usize, f64)>,
     },
@@ -163,6 +164,14 @@ pub struct LoadSpecification {
     pub frame: Frame,
     /// Its components.
     pub signal: [Signal; 3],
+}
+
+impl LoadSpecification {
+    /// A constant force on a node, N.
+    pub fn force(node: usize, force: Vec3) -> Self {
+        let signal = [force.x, force.y, force.z].map(Signal::Constant);
+        Self { kind: LoadKind::NodeForce { node, edge: 0 }, frame: Frame::Laboratory, signal }
+    }
 }
 
 /// Magnetised edges in a field.
@@ -280,6 +289,8 @@ pub struct Specification {
     pub flows: Vec<FlowSpecification>,
     /// Gravity, m/s^2.
     pub gravity: Vec3,
+    /// Reynolds number of every node over its speed, s/m: density times size over viscosity, zero for dry ones; may be empty.
+    pub reynolds: Vec<f64>,
     /// Fluid.
     pub fluid: Option<FluidSpecification>,
     /// Contact.

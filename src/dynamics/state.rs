@@ -1,10 +1,12 @@
 //! The changing part of a simulation: plain data, copied and restored to the last bit.
 
+use super::budget::Account;
 use super::control::Control;
 use super::predictor::History;
 use crate::Vec3;
-use crate::rod::configuration::{ReferenceFrames, node};
+use crate::rod::configuration::node;
 use crate::rod::network::Network;
+use crate::rod::reference::ReferenceFrames;
 
 /// A state of the scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +33,8 @@ pub struct State {
     pub motor_angles: Vec<f64>,
     /// Contact forces of the last step: pairs of bodies (edges first) and force, N.
     pub contacts: Vec<([u32; 2], f64)>,
+    /// Energies, balances and extremes so far.
+    pub account: Account,
     /// Positions of the nodes, m, where barrier contact has listed its near pairs; empty without.
     pub contact_anchor: Vec<Vec3>,
 }

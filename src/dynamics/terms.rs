@@ -1,4 +1,4 @@
-//! Inertia and loads.
+//! Inertia and weight.
 
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{Assembly, Element, Increment, Term};
@@ -41,7 +41,7 @@ impl Term for Inertia {
     }
 }
 
-/// Forces that do not depend on the state: point loads, weight less buoyancy.
+/// Forces that do not depend on the state: weight less buoyancy.
 pub struct Loads {
     forces: Vec<f64>,
 }
@@ -55,7 +55,7 @@ impl Loads {
 
 impl Term for Loads {
     fn name(&self) -> &'static str {
-        "loads"
+        "weight"
     }
 
     fn stencils(&self) -> Vec<Vec<usize>> {

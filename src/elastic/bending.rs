@@ -35,6 +35,6 @@ impl Bending {
             let weighted = slopes[0] * self.stiffness[a][0] + slopes[1] * self.stiffness[a][1];
             hessian.ger(1.0, &slopes[a], &weighted, 1.0);
         }
-        strain.add_curvature_hessian(moments, hessian);
+        strain.add_curvature_hessian(moments, &slopes, hessian);
     }
 }

@@ -30,6 +30,12 @@ impl Hinges {
         self.twisting.iter().enumerate().map(|(k, law)| law.energy(configuration.strain(k))).sum()
     }
 
+    /// Angle by which a straight hinge would be bent to have the curvature that this one has beyond its natural one, rad.
+    pub fn bend(&self, hinge: usize, configuration: &Configuration) -> f64 {
+        let (kappa, natural) = (configuration.strain(hinge).kappa, self.bending[hinge].natural);
+        2.0 * (0.5 * (kappa[0] - natural[0]).hypot(kappa[1] - natural[1])).atan()
+    }
+
     /// Derivative of a hinge's energy with respect to the angles of its first and second edge, N m.
     pub fn moments(&self, hinge: usize, configuration: &Configuration) -> [f64; 2] {
         let mut gradient = Gradient8::zeros();

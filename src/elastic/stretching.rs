@@ -26,8 +26,13 @@ impl Stretching {
         Self { elements, stiffness, rest_lengths }
     }
 
+    /// Strain of an edge.
+    pub fn strain(&self, configuration: &Configuration, edge: usize) -> f64 {
+        configuration.length(edge) / self.rest_lengths[edge] - 1.0
+    }
+
     fn tension(&self, configuration: &Configuration, edge: usize) -> f64 {
-        self.stiffness[edge] * (configuration.length(edge) / self.rest_lengths[edge] - 1.0)
+        self.stiffness[edge] * self.strain(configuration, edge)
     }
 
     /// Adds the residual, and the derivative as if the tensions that turn with the edges were the given ones (N, by edge).

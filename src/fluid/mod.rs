@@ -9,7 +9,7 @@
 //! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
 //! * [`ambient`]: prescribed background flows.
 //! * [`twist_drag`]: resistance of an edge to spinning about its own centreline.
-//! * [`head`]: drag and counter-torque of the seed's head.
+//! * [`head`]: drag of a head, and its couple about all axes.
 
 pub mod ambient;
 pub mod far_field;

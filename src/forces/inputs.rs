@@ -27,6 +27,16 @@ impl Inputs {
         signals.map(|signal| self.add(signal))
     }
 
+    /// The signals, by channel.
+    pub fn signals(&self) -> impl Iterator<Item = &Signal> {
+        self.signals.iter()
+    }
+
+    /// A vanishing value for every channel.
+    pub fn zero(&self) -> Vec<f64> {
+        vec![0.0; self.signals.len()]
+    }
+
     /// The value of every channel at a time.
     ///
     /// # Errors

@@ -101,7 +101,7 @@ impl OutsideForce {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rod::configuration::ReferenceFrames;
+    use crate::rod::reference::ReferenceFrames;
 
     fn bar() -> (Network, Configuration, Vec<f64>) {
         let nodes = [Vec3::zeros(), Vec3::new(2.0, 0.0, 0.0)];

@@ -14,8 +14,9 @@ use nalgebra::{Rotation3, Unit};
 
 use crate::Vec3;
 use crate::elastic::signal::{Signal, SignalError};
-use crate::rod::configuration::{ReferenceFrames, node};
+use crate::rod::configuration::node;
 use crate::rod::frames::{signed_angle, transport_through};
+use crate::rod::reference::ReferenceFrames;
 
 /// A turn about an axis fixed in space.
 #[derive(Debug, Clone)]
@@ -50,15 +51,26 @@ impl Motion {
         Self { velocity: zero(), displacement: zero(), turning: None, spin: Signal::Constant(0.0) }
     }
 
+    /// The signals that move nodes.
+    pub fn shifts(&self) -> impl Iterator<Item = &Signal> {
+        let turning = self.turning.iter().flat_map(|turning| [&turning.rate, &turning.angle]);
+        self.velocity.iter().chain(&self.displacement).chain(turning)
+    }
+
+    /// Displacement from one time to another, later or earlier.
     fn shift(&self, t0: f64, t1: f64) -> Result<Vec3, SignalError> {
         let mut shift = Vec3::zeros();
         for c in 0..3 {
-            shift[c] = self.velocity[c].integral(t0, t1)?;
+            shift[c] = integral(&self.velocity[c], t0, t1)?;
             // A constant displacement moves nothing, and the difference of a constant is exactly zero.
             shift[c] += self.displacement[c].value(t1)? - self.displacement[c].value(t0)?;
         }
         Ok(shift)
     }
+}
+
+fn integral(signal: &Signal, t0: f64, t1: f64) -> Result<f64, SignalError> {
+    if t0 <= t1 { signal.integral(t0, t1) } else { Ok(-signal.integral(t1, t0)?) }
 }
 
 /// An edge of a clamp: its angle, and its index where it turns with the clamp's nodes.
@@ -86,7 +98,12 @@ pub struct Clamp {
 }
 
 impl Clamp {
-    /// Sets the clamped degrees of freedom at `t1`, from those at `t0` and the frames there.
+    /// The signals that move it.
+    pub fn signals(&self) -> impl Iterator<Item = &Signal> {
+        self.motion.shifts().chain((!self.edges.is_empty()).then_some(&self.motion.spin))
+    }
+
+    /// Sets the clamped degrees of freedom at `t1`, later or earlier, from those at `t0` and the frames there; `spin` is the integral of that signal.
     ///
     /// # Errors
     /// What a user's function fails with.
@@ -94,11 +111,10 @@ impl Clamp {
         &self,
         (t0, q): (f64, &[f64]),
         frames: &ReferenceFrames,
-        t1: f64,
+        (t1, spin): (f64, f64),
         target: &mut [f64],
     ) -> Result<(), SignalError> {
         let shift = self.motion.shift(t0, t1)?;
-        let spin = if self.edges.is_empty() { 0.0 } else { self.motion.spin.integral(t0, t1)? };
         let turn = self.turn(t0, t1)?;
         for &dof in &self.nodes {
             let from = node(q, dof);
@@ -119,7 +135,7 @@ impl Clamp {
     /// Rotation from `t0` to `t1`, and the center at `t0`; none if the clamp does not turn.
     fn turn(&self, t0: f64, t1: f64) -> Result<Option<(Rotation3<f64>, Vec3)>, SignalError> {
         let Some(turning) = &self.motion.turning else { return Ok(None) };
-        let angle = turning.rate.integral(t0, t1)? + turning.angle.value(t1)? - turning.angle.value(t0)?;
+        let angle = integral(&turning.rate, t0, t1)? + turning.angle.value(t1)? - turning.angle.value(t0)?;
         let rotation = Rotation3::from_axis_angle(&Unit::new_normalize(turning.axis), angle);
         Ok(Some((rotation, turning.center + self.motion.shift(0.0, t0)?)))
     }
@@ -147,7 +163,7 @@ mod tests {
 
     fn moved(clamp: &Clamp, t0: f64, t1: f64) -> [f64; 7] {
         let mut target = START;
-        clamp.advance((t0, &START), &frames(Vec3::x(), Vec3::y()), t1, &mut target).unwrap();
+        clamp.advance((t0, &START), &frames(Vec3::x(), Vec3::y()), (t1, 0.0), &mut target).unwrap();
         target
     }
 

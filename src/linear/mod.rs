@@ -35,6 +35,9 @@ pub enum LinearError {
         /// Iterations made.
         iterations: usize,
     },
+    /// The caller wants to stop.
+    #[error("interrupted")]
+    Interrupted,
     /// An operator known only by its action could not be applied.
     #[error("the product with the mobility failed: {0}")]
     Product(String),

@@ -44,11 +44,14 @@ impl NearlySymmetric {
         &mut self.values
     }
 
-    /// Factors the matrix without pivoting, if that is possible at all.
+    /// Factors the matrix, without pivoting if it is nearly symmetric and that is possible at all.
     ///
     /// # Errors
     /// [`LinearError::Singular`] if the matrix is not finite or singular.
-    pub fn factor(&mut self) -> Result<(), LinearError> {
+    pub fn factor(&mut self, nearly_symmetric: bool) -> Result<(), LinearError> {
+        if !nearly_symmetric {
+            return self.factor_with_pivoting();
+        }
         self.pivoted = false;
         match self.ldlt.factor(&self.pattern, &self.values) {
             Ok(()) => Ok(()),

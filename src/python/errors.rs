@@ -92,6 +92,7 @@ pub fn step_error(py: Python<'_>, error: StepError) -> PyErr {
                 Err(error) => error,
             }
         }
+        StepError::Interrupted => make(py, "FlagrsError", "interrupted", &PyDict::new(py)),
         StepError::Signal(cause) => match cause.downcast::<PyErr>() {
             Ok(raised) => *raised,
             Err(other) => make(py, "SceneError", &other.to_string(), &PyDict::new(py)),

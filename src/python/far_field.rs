@@ -1,14 +1,11 @@
 //! The product with the mobility without its matrix.
 
-use std::sync::Arc;
-
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use rayon::ThreadPool;
 
 use super::arrays::{from_flat, pairs, points, values};
 use super::errors::{far_field_error, scene_error};
-use crate::dynamics::threads;
+use crate::dynamics::threads::Threads;
 use crate::fluid::far_field::FarField;
 use crate::fluid::product::BLOCK_MEMORY;
 
@@ -17,7 +14,7 @@ use crate::fluid::product::BLOCK_MEMORY;
 pub struct FastMobility {
     inner: FarField,
     own_targets: bool,
-    pool: Option<Arc<ThreadPool>>,
+    threads: Threads,
 }
 
 #[pymethods]
@@ -36,12 +33,13 @@ impl FastMobility {
         let edges = pairs(py, "edges", &edges, nodes.len())?;
         let targets = targets.map(|targets| points(py, "targets", &targets)).transpose()?;
         let epsilon = values(&epsilon);
-        let pool = threads::pool(threads);
+        let threads = Threads(threads);
+        let pool = threads.pool();
         let built = py.detach(|| {
             FarField::new(&nodes, &edges, &epsilon, targets.as_deref(), error, BLOCK_MEMORY, pool.as_deref())
         });
         let inner = built.map_err(|error| far_field_error(py, &error))?;
-        Ok(Self { inner, own_targets: targets.is_some(), pool })
+        Ok(Self { inner, own_targets: targets.is_some(), threads })
     }
 
     /// Moves to other positions of the same nodes, and of the targets if there are any.
@@ -57,7 +55,8 @@ impl FastMobility {
             let allowed = if self.own_targets { "given, as at first" } else { "None, as at first" };
             return Err(scene_error(py, "targets", if self.own_targets { "None" } else { "an array" }, allowed));
         }
-        let Self { inner, pool, .. } = self;
+        let Self { inner, threads, .. } = self;
+        let pool = threads.pool();
         let moved = py.detach(|| inner.update(&nodes, targets.as_deref(), pool.as_deref()));
         moved.map_err(|error| far_field_error(py, &error))
     }
@@ -71,7 +70,8 @@ impl FastMobility {
         let density: Vec<f64> =
             points(py, "force_density", &force_density)?.iter().flat_map(|f| [f.x, f.y, f.z]).collect();
         let mut out = vec![0.0; 3 * self.inner.target_count()];
-        let Self { inner, pool, .. } = self;
+        let Self { inner, threads, .. } = self;
+        let pool = threads.pool();
         py.detach(|| inner.apply(&density, &mut out, pool.as_deref())).map_err(|error| far_field_error(py, &error))?;
         from_flat(py, out, 3)
     }

@@ -1,6 +1,6 @@
 //! The simulation class: a scene's state and the steps that take it forward.
 
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -9,15 +9,14 @@ use pyo3::types::PyDict;
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
+use crate::dynamics::budget::Account;
 use crate::dynamics::control::Control;
+use crate::dynamics::failure::StepError;
 use crate::dynamics::predictor::{History, Sample};
 use crate::dynamics::scheme::Scheme;
 use crate::dynamics::simulation as core;
 use crate::dynamics::state::State;
-use crate::rod::configuration::ReferenceFrames;
-
-/// How often a long computation looks for Ctrl-C.
-const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
+use crate::rod::reference::ReferenceFrames;
 
 /// A running simulation; the class `flagrs.Simulation` wraps it.
 #[pyclass(module = "flagrs._flagrs")]
@@ -60,21 +59,10 @@ impl Simulation {
 
     /// Makes `count` steps of `dt`.
     fn step(&mut self, py: Python<'_>, count: u64) -> PyResult<()> {
-        let inner = &mut self.inner;
-        let mut looked = Instant::now();
-        py.detach(|| {
-            for _ in 0..count {
-                inner.step().map_err(|error| Python::attach(|py| step_error(py, error)))?;
-                if looked.elapsed() > SIGNAL_INTERVAL {
-                    looked = Instant::now();
-                    Python::attach(|py| py.check_signals())?;
-                }
-            }
-            Ok(())
-        })
+        interruptible(py, &mut self.inner, |inner| (0..count).try_for_each(|_| inner.step()))
     }
 
-    /// Local error (m) that adaptive steps keep to; fixed steps without.
+    /// Local error, relative to the size of each filament, that adaptive steps keep to; fixed steps without.
     #[pyo3(signature = (tolerance=None))]
     fn set_tolerance(&mut self, tolerance: Option<f64>) {
         self.inner.set_tolerance(tolerance);
@@ -82,24 +70,18 @@ impl Simulation {
 
     /// Makes adaptive steps until `time` is reached or passed, none beyond `limit`.
     fn advance_past(&mut self, py: Python<'_>, time: f64, limit: f64) -> PyResult<()> {
-        let inner = &mut self.inner;
-        let mut looked = Instant::now();
-        py.detach(|| {
+        interruptible(py, &mut self.inner, |inner| {
             while inner.state().time < time {
-                inner.adaptive_step(limit).map_err(|error| Python::attach(|py| step_error(py, error)))?;
-                if looked.elapsed() > SIGNAL_INTERVAL {
-                    looked = Instant::now();
-                    Python::attach(|py| py.check_signals())?;
-                }
+                inner.adaptive_step(limit)?;
             }
             Ok(())
         })
     }
 
-    /// The frame at a time within the last step, interpolated.
+    /// The frame at a time within the last step, interpolated as far as contact allows.
     fn frame_at<'py>(&mut self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyDict>> {
         let present = self.inner.state().clone();
-        let then = self.inner.state_at(time).map_err(|error| step_error(py, error))?;
+        let then = self.inner.frame_state(time).map_err(|error| step_error(py, error))?;
         self.inner.restore(then);
         let frame = self.frame(py);
         self.inner.restore(present);
@@ -108,9 +90,7 @@ impl Simulation {
 
     /// Advances by `duration` seconds in one step.
     fn advance(&mut self, py: Python<'_>, duration: f64) -> PyResult<()> {
-        let inner = &mut self.inner;
-        py.detach(|| inner.advance(duration)).map_err(|error| step_error(py, error))?;
-        py.check_signals()
+        interruptible(py, &mut self.inner, |inner| inner.advance(duration))
     }
 
     #[getter]
@@ -246,6 +226,7 @@ impl Simulation {
     /// Everything a saved frame holds but the time, as a mapping of arrays.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let frame = PyDict::new(py);
+        let speeds = self.inner.motor_speeds().map_err(|error| step_error(py, StepError::Signal(error)))?;
         let density = self.inner.force_density().map_err(|error| linear_error(py, &error))?;
         frame.set_item("time", self.inner.state().time)?;
         frame.set_item("nodes", self.nodes(py)?)?;
@@ -253,12 +234,18 @@ impl Simulation {
         frame.set_item("velocities", self.velocities(py)?)?;
         frame.set_item("force_density", from_flat(py, density, 3)?)?;
         frame.set_item("motor_angle", PyArray1::from_slice(py, &self.inner.state().motor_angles))?;
-        frame.set_item("motor_speed", PyArray1::from_vec(py, self.inner.motor_speeds()))?;
+        frame.set_item("motor_speed", PyArray1::from_vec(py, speeds))?;
         frame.set_item("motor_torque", PyArray1::from_vec(py, self.inner.motor_torques()))?;
         frame.set_item("minimum_gap", self.inner.smallest_gap().unwrap_or(f64::INFINITY))?;
         frame.set_item("contacts", self.inner.state().contacts.len())?;
+        frame.set_item("account", self.account(py))?;
         frame.set_item("energy", PyArray1::from_slice(py, &self.inner.energies()))?;
         Ok(frame)
+    }
+
+    /// Energies, balances and extremes so far, as `flagrs.budget` reads them.
+    fn account<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.state().account.numbers())
     }
 
     /// Counts and times since the start.
@@ -294,7 +281,7 @@ impl Simulation {
         };
         out.set_item("density", PyArray1::from_slice(py, &state.density))?;
         out.set_item("tensions", PyArray1::from_slice(py, &state.tensions))?;
-        out.set_item("control_step", PyArray1::from_slice(py, &[state.control.dt]))?;
+        out.set_item("control_step", PyArray1::from_slice(py, &control_numbers(&state.control)))?;
         out.set_item("control_order", PyArray1::from_slice(py, &[state.control.order as u64]))?;
         out.set_item("history_times", PyArray1::from_iter(py, past.iter().map(|sample| sample.time)))?;
         out.set_item("history_states", rows(|sample| &sample.q, state.q.len())?)?;
@@ -307,14 +294,17 @@ impl Simulation {
         out.set_item("motor_angles", PyArray1::from_slice(py, &state.motor_angles))?;
         out.set_item("contact_pairs", PyArray1::from_iter(py, pairs).reshape([state.contacts.len(), 2])?)?;
         out.set_item("contact_anchor", from_points(py, &state.contact_anchor)?)?;
+        out.set_item("account", PyArray1::from_slice(py, &state.account.numbers()))?;
         out.set_item("contact_forces", PyArray1::from_iter(py, state.contacts.iter().map(|(_, force)| *force)))?;
         Ok(out)
     }
 
     /// Takes over a state saved by `state()` of a simulation of the same scene.
     fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
-        let current = self.inner.state();
-        let flow = current.density.len();
+        saved.check_shapes(py, self.inner.model().dof_count())?;
+        let flow = self.inner.state().density.len();
+        let account = Account::from_numbers(&values(&saved.account))
+            .ok_or_else(|| scene_error(py, "state", "an account of another length", "what state() returned"))?;
         let mut state = State {
             time: first(&saved.time),
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
@@ -322,7 +312,7 @@ impl Simulation {
             velocity: values(&saved.velocity),
             density: values(&saved.density),
             tensions: values(&saved.tensions),
-            control: Control { dt: first(&saved.control_step), order: whole(&saved.control_order) },
+            control: control(&saved),
             history: History { past: past(&saved), order: whole(&saved.history_order) },
             frames: ReferenceFrames {
                 tangents: points(py, "tangents", &saved.tangents)?,
@@ -330,7 +320,8 @@ impl Simulation {
                 twists: values(&saved.twists),
             },
             motor_angles: values(&saved.motor_angles),
-            contacts: contacts(&saved),
+            contacts: contacts(py, &saved)?,
+            account,
             contact_anchor: points(py, "contact_anchor", &saved.contact_anchor)?,
         };
         // Schemes without a force density of their own save an empty one; the next step finds it.
@@ -339,39 +330,32 @@ impl Simulation {
             state.density = vec![0.0; flow];
             state.history.past.iter_mut().for_each(|sample| sample.density = vec![0.0; flow]);
         }
-        let same = state.q.len() == current.q.len()
-            && state.velocity.len() == current.velocity.len()
-            && state.frames.tangents.len() == current.frames.tangents.len()
-            && state.frames.directors.len() == current.frames.directors.len()
-            && state.frames.twists.len() == current.frames.twists.len()
-            && state.motor_angles.len() == current.motor_angles.len()
-            && state.density.len() == flow
-            && state.tensions.len() == current.tensions.len()
-            && [0, self.inner.model().network().node_count()].contains(&state.contact_anchor.len())
-            && saved.history_states.shape() == [state.history.past.len(), current.q.len()]
-            && saved.history_velocities.shape() == [state.history.past.len(), current.q.len()]
-            && saved.history_densities.shape() == [state.history.past.len(), kept];
-        let bodies = self.inner.model().body_count();
-        let pairs = saved.contact_pairs.as_array();
-        let known = pairs.ncols() == 2
-            && pairs.nrows() == saved.contact_forces.as_array().len()
-            && pairs.iter().all(|&body| usize::try_from(body).is_ok_and(|body| body < bodies));
-        let past = state.history.past.iter();
-        let present = [&state.q, &state.velocity, &state.density, &state.tensions];
-        let finite = present
-            .into_iter()
-            .chain([&state.frames.twists, &state.motor_angles])
-            .chain(past.flat_map(|sample| [&sample.q, &sample.velocity, &sample.density]))
-            .flatten()
-            .chain(state.contacts.iter().map(|(_, force)| force))
-            .chain(state.contact_anchor.iter().flatten())
-            .chain(state.history.past.iter().map(|sample| &sample.time))
-            .chain([&state.time, &state.control.dt])
-            .all(|value| value.is_finite());
-        if !(same && known && finite) {
-            return Err(scene_error(py, "state", "the saved state", "a finite state of the same scene"));
-        }
         self.inner.adopt(state).map_err(|error| model_error(py, &error))
+    }
+}
+
+/// Lets `steps` run without the interpreter's lock, looking for Ctrl-C; what a signal handler raised comes out of it.
+fn interruptible(
+    py: Python<'_>,
+    inner: &mut core::Simulation,
+    steps: impl FnOnce(&mut core::Simulation) -> Result<(), StepError> + Send,
+) -> PyResult<()> {
+    let raised = Arc::new(Mutex::new(None));
+    let report = Arc::clone(&raised);
+    inner.set_interrupt(Some(Box::new(move || match Python::attach(|py| py.check_signals()) {
+        Ok(()) => false,
+        Err(error) => {
+            *report.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            true
+        }
+    })));
+    let done = py.detach(|| steps(inner));
+    inner.set_interrupt(None);
+    let raised = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
+    match (raised, done) {
+        (Some(error), _) => Err(error),
+        (None, Err(error)) => Err(step_error(py, error)),
+        (None, Ok(())) => py.check_signals(),
     }
 }
 
@@ -399,6 +383,7 @@ struct StateInput<'py> {
     contact_pairs: PyReadonlyArray2<'py, i64>,
     contact_forces: PyReadonlyArray1<'py, f64>,
     contact_anchor: PyReadonlyArray2<'py, f64>,
+    account: PyReadonlyArray1<'py, f64>,
 }
 
 fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
@@ -407,6 +392,22 @@ fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
 
 fn whole(array: &PyReadonlyArray1<'_, u64>) -> usize {
     array.as_array().first().map_or(0, |&value| value as usize)
+}
+
+/// What [`control`] reads, but for the order.
+fn control_numbers(control: &Control) -> [f64; 3] {
+    [control.dt, control.ceiling, f64::from(u8::from(control.at_jump))]
+}
+
+/// Size and order of the next step; files of before there was a ceiling have none.
+fn control(saved: &StateInput<'_>) -> Control {
+    let number = |k: usize| saved.control_step.as_array().get(k).copied();
+    Control {
+        dt: first(&saved.control_step),
+        order: whole(&saved.control_order),
+        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).unwrap_or(f64::INFINITY),
+        at_jump: number(2).is_some_and(|flag| flag != 0.0),
+    }
 }
 
 fn past(saved: &StateInput<'_>) -> Vec<Sample> {
@@ -428,13 +429,38 @@ fn past(saved: &StateInput<'_>) -> Vec<Sample> {
         .collect()
 }
 
-fn contacts(saved: &StateInput<'_>) -> Vec<([u32; 2], f64)> {
-    saved
-        .contact_pairs
-        .as_array()
-        .rows()
-        .into_iter()
-        .zip(saved.contact_forces.as_array())
-        .map(|(pair, &force)| ([pair[0] as u32, pair[1] as u32], force))
-        .collect()
+fn contacts(py: Python<'_>, saved: &StateInput<'_>) -> PyResult<Vec<([u32; 2], f64)>> {
+    let (pairs, forces) = (saved.contact_pairs.as_array(), saved.contact_forces.as_array());
+    let index = |value: i64| {
+        u32::try_from(value)
+            .map_err(|_| scene_error(py, "state.contact_pairs", &value.to_string(), "indices of bodies"))
+    };
+    pairs.rows().into_iter().zip(forces).map(|(pair, &force)| Ok(([index(pair[0])?, index(pair[1])?], force))).collect()
+}
+
+impl StateInput<'_> {
+    /// Checks the shapes that converting takes for granted; the core checks everything else.
+    fn check_shapes(&self, py: Python<'_>, dofs: usize) -> PyResult<()> {
+        let past = self.history_times.as_array().len();
+        let flow = self.density.as_array().len();
+        let forces = self.contact_forces.as_array().len();
+        let wanted = [
+            ("time", self.time.shape(), vec![1]),
+            ("steps", self.steps.shape(), vec![1]),
+            ("control_step", self.control_step.shape(), vec![if self.control_step.len() == 1 { 1 } else { 3 }]),
+            ("control_order", self.control_order.shape(), vec![1]),
+            ("history_order", self.history_order.shape(), vec![1]),
+            ("history_states", self.history_states.shape(), vec![past, dofs]),
+            ("history_velocities", self.history_velocities.shape(), vec![past, dofs]),
+            ("history_densities", self.history_densities.shape(), vec![past, flow]),
+            ("contact_pairs", self.contact_pairs.shape(), vec![forces, 2]),
+        ];
+        match wanted.iter().find(|(_, shape, wanted)| shape != wanted) {
+            Some((name, shape, wanted)) => {
+                let (found, allowed) = (format!("shape {shape:?}"), format!("of shape {wanted:?}"));
+                Err(scene_error(py, &format!("state.{name}"), &found, &allowed))
+            }
+            None => Ok(()),
+        }
+    }
 }

@@ -3,25 +3,29 @@
 use std::sync::Arc;
 
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 use super::arrays::{pairs, points, values};
+use super::errors::scene_error;
 use super::loads::{FlowInput, LoadInput, MagnetismInput};
 use crate::Vec3;
+use crate::contact::stiffness::Stiffness;
 use crate::dynamics::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
     HeadSpecification, MotorSpecification, Specification,
 };
-use crate::elastic::signal::Signal;
+use crate::elastic::signal::{Function, Signal, SignalError};
 use crate::fluid::product::FarFieldChoice;
 use crate::kinematics::clamp::{Motion, Turning};
 
-/// A signal: a number, a pair of arrays (times, values), or a callable.
+/// A signal: a number, a pair of arrays (times, values), or a function with its breaks (s), its resolution (s) and the path of
+/// its field.
 #[derive(FromPyObject)]
 pub(super) enum SignalInput<'py> {
     Constant(f64),
     Table(PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>),
-    Function(Py<PyAny>),
+    Function(Py<PyAny>, PyReadonlyArray1<'py, f64>, f64, String),
 }
 
 impl SignalInput<'_> {
@@ -29,10 +33,32 @@ impl SignalInput<'_> {
         match self {
             Self::Constant(value) => Signal::Constant(value),
             Self::Table(times, samples) => Signal::Table { times: values(&times), values: values(&samples) },
-            Self::Function(function) => Signal::Function(Arc::new(move |time| {
-                Python::attach(|py| function.call1(py, (time,))?.extract::<f64>(py))
-                    .map_err(|error| Box::new(error) as crate::elastic::signal::SignalError)
-            })),
+            Self::Function(function, breaks, resolution, field) => {
+                let call = move |time| Python::attach(|py| called(py, &function, time, &field));
+                Signal::Function(Function { value: Arc::new(call), breaks: values(&breaks), resolution })
+            }
+        }
+    }
+}
+
+/// Value of a user's function of time: any error of it, and any value that is not a finite number, names field, time and value.
+fn called(py: Python<'_>, function: &Py<PyAny>, time: f64, field: &str) -> Result<f64, SignalError> {
+    let refused = |given: &str, cause: Option<PyErr>| {
+        let error = scene_error(py, field, &format!("{given} at t = {time} s"), "a finite number at every time");
+        error.set_cause(py, cause);
+        Box::new(error) as SignalError
+    };
+    let value = match function.call1(py, (time,)) {
+        Ok(value) => value.into_bound(py),
+        // Ctrl-C and the like are nobody's mistake.
+        Err(error) if !error.is_instance_of::<PyException>(py) => return Err(Box::new(error)),
+        Err(error) => return Err(refused(&format!("a function that raised {error}"), Some(error))),
+    };
+    match value.extract::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => {
+            let shown = value.repr().map_or_else(|_| "a value without a repr".to_owned(), |text| text.to_string());
+            Err(refused(&format!("a function that gave {}", shown.chars().take(60).collect::<String>()), None))
         }
     }
 }
@@ -50,7 +76,7 @@ struct MotorInput<'py> {
 #[pyo3(from_item_all)]
 struct HeadInput {
     node: usize,
-    neighbours: [usize; 2],
+    edges: Vec<usize>,
     translation: f64,
     rotation: f64,
     mass: f64,
@@ -96,9 +122,11 @@ struct ContactInput {
     barrier: bool,
     tolerance: f64,
     max_iterations: usize,
-    stiffness: f64,
+    stiffness: Option<f64>,
+    driven: Vec<f64>,
+    bent: Vec<f64>,
     friction: f64,
-    slip_velocity: f64,
+    slip_velocities: Vec<f64>,
     spheres: Vec<(usize, f64)>,
     exclusion: f64,
     colliding: Vec<bool>,
@@ -128,6 +156,7 @@ pub struct SceneInput<'py> {
     magnetism: Option<MagnetismInput<'py>>,
     flows: Vec<FlowInput<'py>>,
     gravity: [f64; 3],
+    reynolds: PyReadonlyArray1<'py, f64>,
     fluid: Option<FluidInput<'py>>,
     contact: Option<ContactInput>,
 }
@@ -163,7 +192,7 @@ impl SceneInput<'_> {
                 .collect(),
             head: self.head.map(|head| HeadSpecification {
                 node: head.node,
-                neighbours: head.neighbours,
+                edges: head.edges,
                 translation: head.translation,
                 rotation: head.rotation,
                 mass: head.mass,
@@ -192,6 +221,7 @@ impl SceneInput<'_> {
             magnetism: self.magnetism.map(MagnetismInput::specification),
             flows: self.flows.into_iter().map(FlowInput::specification).collect(),
             gravity: Vec3::from(self.gravity),
+            reynolds: values(&self.reynolds),
             fluid: self.fluid.map(fluid),
             contact: self.contact.map(contact),
             nodes,
@@ -202,10 +232,11 @@ impl SceneInput<'_> {
 }
 
 fn contact(input: ContactInput) -> ContactSpecification {
-    let ContactInput { tolerance, max_iterations, stiffness, friction, slip_velocity, spheres, .. } = input;
+    let ContactInput { tolerance, max_iterations, friction, slip_velocities, spheres, driven, bent, .. } = input;
+    let stiffness = input.stiffness.map_or(Stiffness::Typical { driven, bent }, Stiffness::Uniform);
     ContactSpecification {
         method: if input.barrier {
-            ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocity, spheres }
+            ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocities, spheres }
         } else {
             ContactMethodSpecification::SpillmannTeschner { tolerance, max_iterations }
         },

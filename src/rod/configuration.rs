@@ -1,100 +1,10 @@
 //! Everything about a trial state that several terms need, computed once per evaluation and without allocation.
 
-use super::frames::{Holonomy, orthonormalised, reference_twist, transport_through};
+use super::frames::{FOLDED, Holonomy, one_plus_cosine, orthonormalised, reference_twist, transport_through};
 use super::network::Network;
+use super::reference::ReferenceFrames;
 use super::strain::{EdgeFrame, HingeStrain};
 use crate::Vec3;
-
-/// Frames of the last accepted state, from which trial states are transported in time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ReferenceFrames {
-    /// Unit tangent of every edge.
-    pub tangents: Vec<Vec3>,
-    /// First reference director of every edge.
-    pub directors: Vec<Vec3>,
-    /// Reference twist of every hinge, continued through whole turns, rad.
-    pub twists: Vec<f64>,
-}
-
-impl ReferenceFrames {
-    /// Frames of a shape: on every connected part the first edge's director is transported in space along the hinges.
-    ///
-    /// `first` gives that director (its part normal to the edge counts). Without it the director is the curvature binormal
-    /// at the first bent hinge met, transported back, so that a rotated scene has rotated frames; a straight part takes any
-    /// perpendicular.
-    pub fn of_shape(network: &Network, nodes: &[Vec3], first: &dyn Fn(usize) -> Option<Vec3>) -> Self {
-        let tangents: Vec<Vec3> = network.edges().iter().map(|&[i, j]| (nodes[j] - nodes[i]).normalize()).collect();
-        let mut meeting = vec![Vec::new(); tangents.len()];
-        for hinge in network.hinges() {
-            let [e, f] = hinge.edges;
-            let sign = hinge.signs[0] * hinge.signs[1];
-            meeting[e].push((f, sign));
-            meeting[f].push((e, sign));
-        }
-        let mut directors: Vec<Option<Vec3>> = vec![None; tangents.len()];
-        for root in 0..tangents.len() {
-            if directors[root].is_some() {
-                continue;
-            }
-            let t = tangents[root];
-            let seed = first(root).or_else(|| binormal_seen_from(root, &meeting, &tangents));
-            let seed = seed.map(|d| d - t * d.dot(&t)).filter(|d| d.norm() > 0.0);
-            directors[root] = Some(seed.map_or_else(|| super::frames::any_perpendicular(&t), |d| d.normalize()));
-            let mut queue = std::collections::VecDeque::from([root]);
-            while let Some(edge) = queue.pop_front() {
-                let Some(director) = directors[edge] else {
-                    continue;
-                };
-                for &(other, sign) in &meeting[edge] {
-                    if directors[other].is_none() {
-                        // A reversed edge keeps its first director, and its tangent changes sign.
-                        let moved = transport_through(&director, &(tangents[edge] * sign), &tangents[other]);
-                        directors[other] = Some(orthonormalised(&moved, &tangents[other]));
-                        queue.push_back(other);
-                    }
-                }
-            }
-        }
-        let mut frames = Self {
-            directors: directors.into_iter().flatten().collect(),
-            tangents,
-            twists: vec![0.0; network.hinges().len()],
-        };
-        for (k, hinge) in network.hinges().iter().enumerate() {
-            let [e, f] = hinge.edges;
-            frames.twists[k] = reference_twist(
-                &frames.directors[e],
-                &(frames.tangents[e] * hinge.signs[0]),
-                &frames.directors[f],
-                &(frames.tangents[f] * hinge.signs[1]),
-                0.0,
-            );
-        }
-        frames
-    }
-}
-
-/// Turning angles below this count as straight: the binormal's direction would be round-off.
-const STRAIGHT: f64 = 1e-6;
-
-fn binormal_seen_from(root: usize, meeting: &[Vec<(usize, f64)>], tangents: &[Vec3]) -> Option<Vec3> {
-    let mut seen = vec![false; tangents.len()];
-    let mut queue = std::collections::VecDeque::from([root]);
-    seen[root] = true;
-    while let Some(edge) = queue.pop_front() {
-        for &(other, sign) in &meeting[edge] {
-            let binormal = (tangents[edge] * sign).cross(&tangents[other]);
-            if binormal.norm() > STRAIGHT {
-                return Some(transport_through(&binormal.normalize(), &tangents[edge], &tangents[root]));
-            }
-            if !seen[other] {
-                seen[other] = true;
-                queue.push_back(other);
-            }
-        }
-    }
-    None
-}
 
 /// The angle by which a motor has turned the shaft edge of a hinge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,33 +77,40 @@ impl Configuration {
             self.tangents[k] = t;
             self.directors[k] = director;
             self.material[k] = [director * cosine + second * sine, second * cosine - director * sine];
-            self.holonomies[k] =
-                if *old == t || 1.0 + old.dot(&t) < 1e-4 { Holonomy::NONE } else { Holonomy::new(old, &t, length) };
+            self.holonomies[k] = if *old == t || one_plus_cosine(old, &t) < FOLDED {
+                Holonomy::NONE
+            } else {
+                Holonomy::new(old, &t, length)
+            };
         }
-        for (k, hinge) in network.hinges().iter().enumerate() {
-            let [e, f] = hinge.edges;
-            let [se, sf] = hinge.signs;
-            let frame_e = self.frame(e, se);
-            let frame_f = self.frame(f, sf);
-            if 1.0 + frame_e.t.dot(&frame_f.t) < 1e-10 {
+        for k in 0..network.hinges().len() {
+            let [e, f] = self.hinge_frames(network, k);
+            if one_plus_cosine(&e.t, &f.t) < FOLDED {
                 return false;
             }
-            self.twists[k] =
-                reference_twist(&self.directors[e], &frame_e.t, &self.directors[f], &frame_f.t, reference.twists[k]);
-            let theta = |edge: usize, sign: f64| sign * q[network.edge_dofs()[edge]];
-            let tau = theta(f, sf) - theta(e, se) + self.twists[k];
-            self.strains[k] = HingeStrain::new(frame_e, frame_f, tau);
+            let hinge = network.hinges()[k];
+            let [director_e, director_f] = hinge.edges.map(|edge| self.directors[edge]);
+            self.twists[k] = reference_twist(&director_e, &e.t, &director_f, &f.t, reference.twists[k]);
+            let theta = |side: usize| hinge.signs[side] * q[network.edge_dofs()[hinge.edges[side]]];
+            self.strains[k] = HingeStrain::new(e, f, theta(1) - theta(0) + self.twists[k]);
         }
         for shaft in shafts {
-            let HingeStrain { mut e, mut f, tau, .. } = self.strains[shaft.hinge];
-            if shaft.second {
-                f = turned(&f, -shaft.angle);
+            let [e, f] = self.hinge_frames(network, shaft.hinge);
+            let tau = self.strains[shaft.hinge].tau - shaft.angle;
+            self.strains[shaft.hinge] = if shaft.second {
+                HingeStrain::new(e, f.turned((-shaft.angle).sin_cos()), tau)
             } else {
-                e = turned(&e, shaft.angle);
-            }
-            self.strains[shaft.hinge] = HingeStrain::new(e, f, tau - shaft.angle);
+                HingeStrain::new(e.turned(shaft.angle.sin_cos()), f, tau)
+            };
         }
         true
+    }
+
+    /// Material frames of a hinge's two edges as the hinge sees them.
+    #[inline]
+    fn hinge_frames(&self, network: &Network, hinge: usize) -> [EdgeFrame; 2] {
+        let hinge = network.hinges()[hinge];
+        [self.frame(hinge.edges[0], hinge.signs[0]), self.frame(hinge.edges[1], hinge.signs[1])]
     }
 
     fn frame(&self, edge: usize, sign: f64) -> EdgeFrame {
@@ -242,11 +159,6 @@ impl Configuration {
         reference.directors.copy_from_slice(&self.directors);
         reference.twists.copy_from_slice(&self.twists);
     }
-}
-
-fn turned(frame: &EdgeFrame, angle: f64) -> EdgeFrame {
-    let (sine, cosine) = angle.sin_cos();
-    EdgeFrame { m1: frame.m1 * cosine + frame.m2 * sine, m2: frame.m2 * cosine - frame.m1 * sine, ..*frame }
 }
 
 /// Reads three consecutive coordinates.

@@ -2,20 +2,28 @@
 
 use crate::{Mat3, Vec3};
 
+/// Two edges of a hinge whose `1 + cos` of the turning angle is below this have folded onto each other: no configuration.
+pub const FOLDED: f64 = 1e-10;
+
+/// `1 + a . b` of unit vectors, to more digits where they are nearly antiparallel.
+#[inline]
+pub fn one_plus_cosine(a: &Vec3, b: &Vec3) -> f64 {
+    0.5 * (a + b).norm_squared()
+}
+
 /// Transports `v` from unit tangent `from` to unit tangent `to` by the smallest rotation that takes one to the other.
 ///
 /// Not defined for antiparallel tangents; see [`transport_through`].
 #[inline]
 pub fn parallel_transport(v: &Vec3, from: &Vec3, to: &Vec3) -> Vec3 {
     let axis = from.cross(to);
-    let cosine = from.dot(to);
-    v * cosine + axis.cross(v) + axis * (axis.dot(v) / (1.0 + cosine))
+    v * from.dot(to) + axis.cross(v) + axis * (axis.dot(v) / one_plus_cosine(from, to))
 }
 
-/// Like [`parallel_transport`], but defined for every pair: nearly antiparallel tangents are reached through a
+/// Like [`parallel_transport`], but defined for every pair: tangents that no hinge could have are reached through a
 /// perpendicular one, chosen by `from` alone.
 pub fn transport_through(v: &Vec3, from: &Vec3, to: &Vec3) -> Vec3 {
-    if 1.0 + from.dot(to) > 1e-4 {
+    if one_plus_cosine(from, to) > FOLDED {
         return parallel_transport(v, from, to);
     }
     let middle = any_perpendicular(from);
@@ -79,7 +87,7 @@ impl Holonomy {
     /// Derivatives at an edge of unit tangent `t` and the given length.
     pub fn new(reference: &Vec3, t: &Vec3, length: f64) -> Self {
         let normal = t.cross(reference);
-        let half = 1.0 + reference.dot(t);
+        let half = one_plus_cosine(reference, t);
         let slope = normal / half;
         // d2 beta/dt2 = -(n (t + u)^T + (t + u) n^T) / (2 half^2) with n = t x u, projected on the plane normal to t, plus the curvature of
         // the unit sphere, -(g t^T + t g^T) / length^2 with g the slope.

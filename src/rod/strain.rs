@@ -3,10 +3,12 @@
 //! The variables are `(e, theta_e, f, theta_f)`: the edge vectors that meet at the hinge, both pointing from its first
 //! to its last node, and the angles of their material frames. Derivatives hold the reference frames of the present
 //! configuration, moved by parallel transport; [`super::assembly`] adds the holonomy of transport from the last accepted state.
-//! Formulas: Bergou et al. 2010 with the mean directors of the seed's equation 2; docs/theory, "Strains".
+//! Curvature is measured in the material frame halfway through the twist, a unit frame, and not against the mean of the two
+//! edges' directors, which shrinks with it: formulas and reasons in docs/theory, "Strains".
 
 use nalgebra::{SMatrix, SVector};
 
+use super::frames::one_plus_cosine;
 use crate::{Mat3, Vec3};
 
 /// Gradient in the hinge's variables: `e` in 0..3, `theta_e` at 3, `f` in 4..7, `theta_f` at 7.
@@ -34,16 +36,24 @@ pub struct EdgeFrame {
     pub length: f64,
 }
 
+impl EdgeFrame {
+    /// The frame turned about its tangent by the angle of this sine and cosine.
+    #[inline]
+    pub fn turned(&self, (sine, cosine): (f64, f64)) -> Self {
+        Self { m1: self.m1 * cosine + self.m2 * sine, m2: self.m2 * cosine - self.m1 * sine, ..*self }
+    }
+}
+
 /// Geometry and strains of a hinge in one configuration.
 #[derive(Debug, Clone, Copy)]
 pub struct HingeStrain {
-    /// The incoming edge.
-    pub e: EdgeFrame,
-    /// The outgoing edge.
-    pub f: EdgeFrame,
+    /// The incoming edge, its frame turned on by half the twist.
+    e: EdgeFrame,
+    /// The outgoing edge, its frame turned back by half the twist: that of `e`, moved by parallel transport.
+    f: EdgeFrame,
     /// Curvature binormal (equation 1).
-    pub kb: Vec3,
-    /// Integrated curvature (equation 2).
+    kb: Vec3,
+    /// Integrated curvature in the frame halfway through the twist.
     pub kappa: [f64; 2],
     /// Integrated twist (equation 3), motor angle taken off (equation 4), rad.
     pub tau: f64,
@@ -63,9 +73,11 @@ fn symmetric_outer(a: &Vec3, b: &Vec3) -> Mat3 {
 }
 
 impl HingeStrain {
-    /// Strains from the two frames and the twist.
+    /// Strains from the material frames of the two edges and the twist between them, whole turns included.
     pub fn new(e: EdgeFrame, f: EdgeFrame, tau: f64) -> Self {
-        let chi = 1.0 + e.t.dot(&f.t);
+        let (sine, cosine) = (0.5 * tau).sin_cos();
+        let (e, f) = (e.turned((sine, cosine)), f.turned((-sine, cosine)));
+        let chi = one_plus_cosine(&e.t, &f.t);
         let kb = e.t.cross(&f.t) * (2.0 / chi);
         let (sum_m1, sum_m2) = (e.m1 + f.m1, e.m2 + f.m2);
         Self {
@@ -83,7 +95,7 @@ impl HingeStrain {
 
     /// Gradients of `kappa_1` and `kappa_2`.
     pub fn curvature_gradients(&self) -> [Gradient8; 2] {
-        let Self { e, f, kb, kappa, mean_tangent, .. } = self;
+        let Self { e, f, kappa, mean_tangent, .. } = self;
         let mut first = Gradient8::zeros();
         let mut second = Gradient8::zeros();
         let along_e = |k: f64, cross: Vec3| (-k * mean_tangent + cross) / e.length;
@@ -92,10 +104,11 @@ impl HingeStrain {
         first.fixed_rows_mut::<3>(EDGE_F).copy_from(&along_f(kappa[0], -e.t.cross(&self.mean_m2)));
         second.fixed_rows_mut::<3>(0).copy_from(&along_e(kappa[1], -f.t.cross(&self.mean_m1)));
         second.fixed_rows_mut::<3>(EDGE_F).copy_from(&along_f(kappa[1], e.t.cross(&self.mean_m1)));
-        first[THETA_E] = -0.5 * kb.dot(&e.m1);
-        first[THETA_F] = -0.5 * kb.dot(&f.m1);
-        second[THETA_E] = -0.5 * kb.dot(&e.m2);
-        second[THETA_F] = -0.5 * kb.dot(&f.m2);
+        // Either angle turns the frame halfway by half as much.
+        for angle in [THETA_E, THETA_F] {
+            first[angle] = 0.5 * kappa[1];
+            second[angle] = -0.5 * kappa[0];
+        }
         [first, second]
     }
 
@@ -109,17 +122,17 @@ impl HingeStrain {
         gradient
     }
 
-    /// Adds `weights[0] H(kappa_1) + weights[1] H(kappa_2)`.
-    pub fn add_curvature_hessian(&self, weights: [f64; 2], out: &mut Hessian8) {
+    /// Adds `weights[0] H(kappa_1) + weights[1] H(kappa_2)`, given [`Self::curvature_gradients`].
+    pub fn add_curvature_hessian(&self, weights: [f64; 2], slopes: &[Gradient8; 2], out: &mut Hessian8) {
         let Self { e, f, kb, kappa, chi, mean_tangent, .. } = self;
         // The second curvature is the first with (m2, m1, +) exchanged for (m1, m2, -): the weighted sum needs only sums of
         // directors.
         let weighted = weights[0] * kappa[0] + weights[1] * kappa[1];
         let mean = self.mean_m2 * weights[0] - self.mean_m1 * weights[1];
-        let own_e = e.m2 * weights[0] - e.m1 * weights[1];
-        let own_f = f.m2 * weights[0] - f.m1 * weights[1];
-        let turned_e = e.m1 * weights[0] + e.m2 * weights[1];
-        let turned_f = f.m1 * weights[0] + f.m2 * weights[1];
+        // The frame halfway turns with the twist, and that with the edges: the terms with kb kb^T.
+        let with_twist = kb * (weighted / 32.0);
+        let own_e = (e.m2 * weights[0] - e.m1 * weights[1]) * 0.25 + with_twist;
+        let own_f = (f.m2 * weights[0] - f.m1 * weights[1]) * 0.25 + with_twist;
 
         let across_f = f.t.cross(&mean);
         let across_e = e.t.cross(&mean);
@@ -129,15 +142,16 @@ impl HingeStrain {
         let block_ee = (mean_outer * (2.0 * weighted)
             - symmetric_outer(&across_f, mean_tangent)
             - (identity - e.t * e.t.transpose()) * (weighted / chi)
-            + symmetric_outer(kb, &own_e) * 0.25)
+            + symmetric_outer(kb, &own_e))
             / (e.length * e.length);
         let block_ff = (mean_outer * (2.0 * weighted) + symmetric_outer(&across_e, mean_tangent)
             - (identity - f.t * f.t.transpose()) * (weighted / chi)
-            + symmetric_outer(kb, &own_f) * 0.25)
+            + symmetric_outer(kb, &own_f))
             / (f.length * f.length);
         let block_ef = (mean_outer * (2.0 * weighted) - across_f * mean_tangent.transpose()
             + mean_tangent * across_e.transpose()
             - (identity + e.t * f.t.transpose()) * (weighted / chi)
+            + kb * with_twist.transpose() * 2.0
             - skew(&mean))
             / (e.length * f.length);
         add_block(out, 0, 0, &block_ee);
@@ -145,13 +159,13 @@ impl HingeStrain {
         add_block(out, 0, EDGE_F, &block_ef);
         add_block(out, EDGE_F, 0, &block_ef.transpose());
 
-        for (angle, own, turned) in [(THETA_E, own_e, turned_e), (THETA_F, own_f, turned_f)] {
-            out[(angle, angle)] -= 0.5 * kb.dot(&own);
-            let slope = 0.5 * kb.dot(&turned);
-            let with_e = (mean_tangent * slope - f.t.cross(&turned) / *chi) / e.length;
-            let with_f = (mean_tangent * slope + e.t.cross(&turned) / *chi) / f.length;
-            add_mixed(out, 0, angle, &with_e);
-            add_mixed(out, EDGE_F, angle, &with_f);
+        // d kappa_1 / d theta = kappa_2 / 2 and d kappa_2 / d theta = -kappa_1 / 2, for either angle.
+        let column = (slopes[1] * weights[0] - slopes[0] * weights[1]) * 0.5;
+        for angle in [THETA_E, THETA_F] {
+            add_mixed(out, 0, angle, &column);
+            add_mixed(out, EDGE_F, angle, &column);
+            out[(angle, THETA_E)] -= 0.25 * weighted;
+            out[(angle, THETA_F)] -= 0.25 * weighted;
         }
     }
 
@@ -174,9 +188,9 @@ fn add_block(out: &mut Hessian8, row: usize, column: usize, block: &Mat3) {
     target += block;
 }
 
-fn add_mixed(out: &mut Hessian8, row: usize, angle: usize, column: &Vec3) {
-    for k in 0..3 {
-        out[(row + k, angle)] += column[k];
-        out[(angle, row + k)] += column[k];
+fn add_mixed(out: &mut Hessian8, row: usize, angle: usize, column: &Gradient8) {
+    for k in row..row + 3 {
+        out[(k, angle)] += column[k];
+        out[(angle, k)] += column[k];
     }
 }

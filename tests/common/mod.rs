@@ -47,6 +47,7 @@ pub fn scene(nodes: Vec<Vec3>, edges: Vec<[usize; 2]>, hinges: Vec<[usize; 2]>) 
         magnetism: None,
         flows: vec![],
         gravity: Vec3::zeros(),
+        reynolds: vec![],
         fluid: None,
         contact: None,
     }

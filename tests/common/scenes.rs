@@ -4,6 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use flagrs::Vec3;
+use flagrs::contact::stiffness::Stiffness;
 use flagrs::dynamics::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
     HeadSpecification, MotorSpecification, Specification,
@@ -119,6 +120,7 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
         magnetism: None,
         flows: vec![],
         gravity: Vec3::zeros(),
+        reynolds: vec![],
         fluid: Some(FluidSpecification {
             viscosity: substance.viscosity,
             model: FluidModelSpecification::StokesletSegments {
@@ -137,9 +139,9 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
 fn contact(colliding: Vec<bool>, stiffness: f64) -> ContactSpecification {
     let method = ContactMethodSpecification::Barrier {
         tolerance: 0.05,
-        stiffness,
+        stiffness: Stiffness::Uniform(stiffness),
         friction: 0.0,
-        slip_velocity: 1.0,
+        slip_velocities: Vec::new(),
         spheres: Vec::new(),
     };
     ContactSpecification { method, exclusion: FRAC_PI_2, colliding }
@@ -182,7 +184,7 @@ pub fn robot(normalized_pitch: f64, rpm: f64) -> Specification {
     let head_radius = 31e-3_f64;
     scene.head = Some(HeadSpecification {
         node: base + 4,
-        neighbours: [base + 3, base + 5],
+        edges: vec![base + 3, base + 4],
         translation: 4.1 * 6.0 * PI * ROBOT.viscosity * head_radius,
         rotation: 0.9 * 8.0 * PI * ROBOT.viscosity * head_radius.powi(3),
         mass: 0.0,

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from flagrs import Clamp, Contact, Fluid, Material, PointLoad, Rod, Scene, Simulation, Table
+from flagrs import Clamp, Contact, Fluid, PointLoad, Rod, Scene, Simulation, Table
 from flagrs.contact import segment_distance
+from flagrs.validation.problems.friction import Capstan, incline_velocity
+from flagrs.validation.touching import GRAVITY, SILICONE, contact_forces, drag, held, unrolled, weight
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
+__all__ = [
+    "Capstan",
+    "contact_forces",
+    "drag",
+    "held",
+    "incline_velocity",
+    "weight",
+]
+
 Array = npt.NDArray[np.float64]
-
-SILICONE = Material(youngs_modulus=1e6, density=1200.0)
-GRAVITY = 9.81
-
-
-def held(rod: int, edge_count: int, **motion: object) -> Clamp:
-    """Return the clamp of all of a rod."""
-    return Clamp(rod=rod, nodes=tuple(range(edge_count + 1)), edges=tuple(range(edge_count)), **motion)
 
 
 def radii(scene: Scene) -> Array:
@@ -57,207 +60,6 @@ class Watch:
         now = float((distance / self.thickness).min())
         self.least = min(self.least, now)
         return now
-
-
-def contact_forces(simulation: Simulation) -> tuple[npt.NDArray[np.int64], Array, Array]:
-    """Return pairs of edges (P, 2), the force (P, 3) on the first of each [N] and its size (P,)."""
-    state = simulation.state()
-    pairs, sizes = state["contact_pairs"].astype(np.int64), state["contact_forces"]
-    x, edges = simulation.nodes, simulation.edges
-    (a, b) = edges[pairs[:, 0]], edges[pairs[:, 1]]
-    _, s, t = segment_distance(x[a[:, 0]], x[a[:, 1]], x[b[:, 0]], x[b[:, 1]])
-    along = x[a[:, 0]] + s[:, None] * (x[a[:, 1]] - x[a[:, 0]])
-    along -= x[b[:, 0]] + t[:, None] * (x[b[:, 1]] - x[b[:, 0]])
-    return pairs, sizes[:, None] * along / np.linalg.norm(along, axis=1)[:, None], sizes
-
-
-def drag(simulation: Simulation) -> Array:
-    """Return the force (N, 3) of the nodes on the fluid [N]."""
-    force: Array = (simulation.resistance() @ simulation.velocities.ravel()).reshape(-1, 3)
-    return force
-
-
-def firm(material: Material, radius: float, length: float) -> float:
-    """Return a stiffness of contact [Pa] by which surfaces meet nearly at their radii.
-
-    At centrelines a sum of radii apart it bears the force per length that bends a free rod on the wavelength
-    of its slowest vibration: what theory for rods that touch at a given distance is compared with.
-    """
-    bending = material.youngs_modulus * np.pi * radius**4 / 4.0 / (length / 4.73) ** 3
-    return float(bending / (0.1 * 2.0 * radius * (np.log(2.0) + 0.5)))
-
-
-# --- a rod on an incline -----------------------------------------------------------------------------------
-
-
-def incline(angle: float, friction: float, slip_velocity: float, lengthwise: bool = False) -> Scene:
-    """Return a short stiff rod on two fixed rails, under gravity tilted by an angle [rad] towards +x.
-
-    It lies across the rails and slides sideways, along them; or, lengthwise, along itself across them.
-    """
-    length, radius = 0.02, 1e-3
-    direction = np.array([0.0, 1.0, 0.0])
-    across = np.array([1.0, 0.0, 0.0]) if lengthwise else direction
-    rail = np.array([0.0, 1.0, 0.0]) if lengthwise else np.array([1.0, 0.0, 0.0])
-    stiff = Material(youngs_modulus=1e9, density=2000.0)
-    rails = [
-        Rod.straight(
-            length=0.2,
-            edge_count=20,
-            radius=radius,
-            material=stiff,
-            start=tuple(side * 0.006 * across - 0.1 * rail + np.array([0.0013, 0.0013, 0.0]) * rail),
-            direction=tuple(rail),
-        )
-        for side in (-1.0, 1.0)
-    ]
-    rod = Rod.straight(
-        length=length,
-        edge_count=5,
-        radius=radius,
-        material=stiff,
-        start=tuple(-0.5 * length * across + np.array([0.0, 0.0, 2.0 * radius])),
-        direction=tuple(across),
-    )
-    return Scene(
-        rods=(rod, *rails),
-        fluid=Fluid(viscosity=1.0, model="RFT"),
-        clamps=(held(1, 20), held(2, 20)),
-        gravity=GRAVITY * np.array([np.sin(angle), 0.0, -np.cos(angle)]),
-        contact=Contact(
-            friction=friction, slip_velocity=slip_velocity, stiffness=firm(stiff, radius, length)
-        ),
-    )
-
-
-def incline_theory(simulation: Simulation, angle: float) -> float:
-    """Return the velocity along the incline [m/s] from the balance of weight, Coulomb's friction and drag."""
-    scene = simulation.scene
-    contact = scene.contact
-    assert contact is not None and contact.slip_velocity is not None
-    rod, mu, slip = scene.rods[0], contact.friction, contact.slip_velocity
-    count = len(rod.nodes)
-    resistance = simulation.resistance()[: 3 * count : 3, : 3 * count : 3].sum()
-    volume = np.pi * rod.radius_array()[0] ** 2 * rod.rest_lengths().sum()
-    weight = rod.material.density * volume * GRAVITY
-    pull, normal = weight * np.sin(angle), weight * np.cos(angle)
-    if pull - mu * normal >= resistance * slip:
-        return float((pull - mu * normal) / resistance)
-    # mu N (v / nu) (2 - v / nu) + zeta v = pull, a quadratic in v / nu, its smaller root.
-    a, b = mu * normal, 2.0 * mu * normal + resistance * slip
-    return float(slip * 2.0 * pull / (b + np.sqrt(b * b - 4.0 * a * pull)))
-
-
-def incline_velocity(
-    angle: float, friction: float, slip_velocity: float, lengthwise: bool = False
-) -> tuple[float, float, float]:
-    """Return velocity along the incline, theory's [m/s], and the power of friction [W]."""
-    simulation = Simulation(incline(angle, friction, slip_velocity, lengthwise), dt=2e-3, threads=1)
-    theory = incline_theory(simulation, angle)
-    # Settle, then take as large steps as move the rod by a tenth of its diameter.
-    simulation.step(100)
-    simulation.dt = min(1e-3 / max(theory, 1e-9), 1.0) * 0.1
-    simulation.step(10)
-    count = len(simulation.scene.rods[0].nodes)
-    velocity = float(simulation.velocities[:count, 0].mean())
-    force = drag(simulation)[:count].sum(axis=0)
-    rod = simulation.scene.rods[0]
-    weight = (
-        rod.material.density
-        * np.pi
-        * rod.radius_array()[0] ** 2
-        * rod.rest_lengths().sum()
-        * simulation.scene.gravity
-    )
-    _, contact, _ = contact_forces(simulation)
-    rubbing = force - weight - contact.sum(axis=0)  # what is left of the balance is friction
-    return velocity, theory, float(rubbing[0] * velocity)
-
-
-# --- a rope around a drum ----------------------------------------------------------------------------------
-
-
-class Capstan:
-    """A soft rope wrapped by an angle around a fixed drum, loaded at one end and pulled at the other."""
-
-    DRUM, ROPE, LOAD, SPEED = 5e-3, 5e-4, 1e-2, 1e-4
-    #: EI / (T R^2), the rope's bending stiffness over what its load makes of it on the drum.
-    STIFFNESS = 1e-3
-
-    def __init__(self, wrap: float, friction: float, turn_per_edge: float = 0.1) -> None:
-        self.wrap, self.friction = wrap, friction
-        circle = self.DRUM + self.ROPE
-        advance = 0.0 if wrap <= 1.01 * np.pi else 2.0 * self.ROPE / np.pi
-        angle = np.linspace(-wrap / 2.0, wrap / 2.0, round(wrap / turn_per_edge) + 1)
-        around = circle / np.cos((angle[1] - angle[0]) / 2.0)  # so that edges touch the circle
-        arc = np.stack([around * np.sin(angle), advance * angle, around * np.cos(angle)], axis=1)
-        out = np.stack([np.cos(angle), np.full(len(angle), advance / circle), -np.sin(angle)], axis=1)
-        out /= np.linalg.norm(out, axis=1)[:, None]
-        tail = turn_per_edge * circle * np.arange(1, round(2.0 / turn_per_edge) + 1)[:, None]
-        nodes = np.concatenate([(arc[0] - tail * out[0])[::-1], arc, arc[-1] + tail * out[-1]])
-        self.last, self.pull = len(nodes) - 1, out[-1]
-        bending = self.STIFFNESS * self.LOAD * circle**2
-        rope = Rod(
-            nodes=nodes,
-            rest_nodes=unrolled(nodes),
-            radius=self.ROPE,
-            material=SILICONE,
-            EI=bending,
-            GJ=bending,
-            EA=1e4 * self.LOAD,
-        )
-        drum = Rod.straight(
-            length=8.0 * self.DRUM,
-            edge_count=4,
-            radius=self.DRUM,
-            material=SILICONE,
-            start=(0.0, -4.0 * self.DRUM + 1e-4, 0.0),
-            direction=(0.0, 1.0, 0.0),
-        )
-        self.scene = Scene(
-            rods=(rope, drum),
-            fluid=Fluid(viscosity=0.1, model="RFT"),
-            clamps=(Clamp(nodes=(self.last,), velocity=self.SPEED * self.pull), held(1, 4)),
-            loads=(PointLoad(node=0, force=-self.LOAD * out[0]),),
-            contact=Contact(friction=friction, slip_velocity=1e-3 * self.SPEED),
-        )
-
-    def ratio(self, count: int = 20) -> float:
-        """Return the pulling force over the load, when the rope slides."""
-        simulation = Simulation(self.scene, dt=1e-3, threads=1)
-        while simulation.dt * self.SPEED < 0.02 * self.DRUM:
-            simulation.step()
-            simulation.dt *= 1.5
-        at = simulation.dof_of_node[self.last]
-        pulls = []
-        for _ in range(count):
-            simulation.step()
-            pulls.append(float(simulation.gradient()[at : at + 3] @ self.pull))
-        assert simulation.frame()["minimum_gap"] > -0.05 * (self.DRUM + self.ROPE)
-        return float(np.mean(pulls[count // 2 :])) / self.LOAD
-
-    def theory(self) -> float:
-        """Return the ratio of an inextensible elastica in contact with a circle, with Coulomb's friction.
-
-        Where the rope leaves the drum the tension is less by EI / 2R^2 than far away: it leaves before the
-        tangent of the load, by the angle d with cos d = 1 - EI / (2 T R^2), and presses there with T sin d.
-        """
-        mu, stiffness = self.friction, self.STIFFNESS
-
-        def missing(ratio: float) -> float:
-            first, last = np.arccos(1.0 - 0.5 * stiffness), np.arccos(1.0 - 0.5 * stiffness / ratio)
-            here = ratio * (np.cos(last) - mu * np.sin(last))
-            there = np.cos(first) + mu * np.sin(first)
-            return float(here - there * np.exp(mu * (self.wrap - first - last)))
-
-        return float(brentq(missing, 0.5, 1e4))
-
-
-def unrolled(nodes: Array) -> Array:
-    """Return the straight shape (N, 3) with the edges of a curved one [m]."""
-    straight = np.zeros_like(nodes)
-    straight[1:, 0] = np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))
-    return straight
 
 
 def even(path: Array, edge_count: int) -> Array:
@@ -469,7 +271,7 @@ def heap(count: int = 10, friction: float = 0.0, seed: int = 1) -> Scene:
         )
     return Scene(
         rods=(*rods, *rails),
-        fluid=Fluid(viscosity=1.0, model="RFT"),
+        fluid=Fluid(viscosity=1.0, model="RFT", density=0.0),
         clamps=tuple(held(count + k, 4) for k in range(len(rails))),
         contact=Contact(friction=friction),
         gravity=np.array([0.0, 0.0, -GRAVITY]),
@@ -486,13 +288,6 @@ def settled_heap(scene: Scene) -> tuple[Simulation, Watch]:
             simulation.dt = min(1.05 * simulation.dt, 0.5)
         watch.closest()
     return simulation, watch
-
-
-def weight(rod: Rod) -> float:
-    """Return the weight of a rod of constant radius [N]."""
-    return float(
-        rod.material.density * np.pi * rod.radius_array()[0] ** 2 * rod.rest_lengths().sum() * GRAVITY
-    )
 
 
 def pressed(scale: float = 1.0, radius: float = 1e-3, viscosity: float = 0.1) -> Scene:

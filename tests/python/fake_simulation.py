@@ -72,10 +72,15 @@ class FakeSimulation:
         save_every: float,
         path: str | Path | None = None,
         progress: Callable[[float], None] | None = None,
+        overwrite: bool = False,
     ) -> Trajectory:
         """Record frames until a time, with a checkpoint at every tenth and at the end."""
         again = path is not None and Path(path) == self._restored
-        with Recorder.resume(path, self.scene) if again and path else self._recorder(path) as recorder:
+        with (
+            Recorder.resume(path, self.scene)
+            if again and path
+            else self._recorder(path, overwrite) as recorder
+        ):
             first = round(self.time / save_every)
             for number in range(first + 1 if again else first, round(until / save_every) + 1):
                 self.time = number * save_every
@@ -87,5 +92,5 @@ class FakeSimulation:
             recorder.checkpoint(self.state())
         return recorder.trajectory()
 
-    def _recorder(self, path: str | Path | None) -> Recorder:
-        return Recorder(path, self.scene, self.settings)
+    def _recorder(self, path: str | Path | None, overwrite: bool) -> Recorder:
+        return Recorder(path, self.scene, self.settings, overwrite)

@@ -62,8 +62,8 @@ def test_a_rope_around_a_drum_multiplies_its_load_by_the_exponential_of_friction
     wrap: float, friction: float
 ) -> None:
     capstan = Capstan(wrap, friction)
-    # 0.5 % too little at most with these steps: normal forces are those of the step before.
-    assert capstan.ratio() == pytest.approx(capstan.theory(), rel=1e-2)
+    # The rope's circle shrinks by up to the range of contact where it is pulled harder: 0.17 % at most.
+    assert capstan.ratio() == pytest.approx(capstan.theory(), rel=3e-3)
     # With a bending stiffness of 1e-3 T R^2 the capstan formula itself is as good.
     assert capstan.theory() == pytest.approx(np.exp(friction * wrap), rel=1e-3)
 
@@ -132,7 +132,9 @@ def test_rods_driven_through_each_other_never_cross(dt: float, options: dict[str
                     assert watch.closest() >= LEAST
             except ConvergenceError:
                 # Only where a fixed step stretches the rods to many times their length.
-                assert speed * dt >= 0.1 and dt >= 0.1 and not options
+                assert not options
+                assert speed * dt >= 0.1
+                assert dt >= 0.1
             assert watch.closest() >= LEAST
             upper, lower = simulation.nodes[8:10], simulation.nodes[2:4]
             assert upper[:, 2].min() > lower[:, 2].max()
@@ -159,7 +161,8 @@ def test_rings_pulled_through_each_other_stay_linked_or_not(
     simulation.step(6)
     assert np.abs(linking_numbers(simulation.nodes) - before).max() < 1e-12
     assert simulation.frame()["minimum_gap"] >= -0.05 * 2e-3
-    assert simulation.frame()["contacts"] > 0 or dt < 1e-2 or load < 1e-2
+    if dt >= 1e-2 and load >= 1e-2:
+        assert simulation.frame()["contacts"] > 0
 
 
 def test_a_start_with_an_overlap_is_an_error_that_names_the_edges() -> None:
@@ -265,7 +268,7 @@ def test_a_branching_network_and_a_fold_touch_as_rods_do() -> None:
     ]
     scene = Scene(
         rods=(fork, *rails),
-        fluid=Fluid(viscosity=1.0, model="RFT"),
+        fluid=Fluid(viscosity=1.0, model="RFT", density=0.0),
         clamps=(held(1, 6), held(2, 6)),
         contact=Contact(),
         gravity=np.array([0.0, 0.0, -9.81]),

@@ -37,7 +37,7 @@ def density(count: int) -> Array:
 def scene(count: int, **options: Any) -> Scene:
     material = scenarios.clamped_flagella(count=1).rods[0].material
     rods = [Rod.from_nodes(nodes, radius=1e-3, material=material) for nodes in helices(count)]
-    return Scene(rods=rods, fluid=Fluid(viscosity=0.1, **options), gravity=(0.0, 0.0, -9.81))
+    return Scene(rods=rods, fluid=Fluid(viscosity=0.1, density=0.0, **options), gravity=(0.0, 0.0, -9.81))
 
 
 def displacement(count: int, steps: int = 2, threads: int = 1, **options: Any) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from flagrs import Fluid, Material, Rod, Scene, Simulation, scenarios
-from flagrs.time_step import default_step
+from flagrs.default_step import default_step
 from rod_motion import disturbance_grows, imbalance, linear_limit, moved, soft_helix
 from rod_statics import settle
 from scipy.spatial.transform import Rotation

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from elastica import tip_deflection
 from flagrs import Fluid, Material, Motor, Rod, Scene, Simulation, scenarios
+from flagrs.validation.elastica import tip_deflection
+from flagrs.validation.problems.rings import critical_twist, michell
 from rod_motion import moved
 from rod_statics import (
     cantilever_compliance,
     cantilever_length,
     cantilever_tip,
-    critical_twist,
-    michell,
 )
 from scipy.spatial.transform import Rotation
 

@@ -27,11 +27,12 @@ class Failing(FakeSimulation):
         save_every: float,
         path: str | Path | None = None,
         progress: Callable[[float], None] | None = None,
+        overwrite: bool = False,
     ) -> Trajectory:
         """Run, or fail."""
         if self.scene == scenarios.robot(rpm=13.0):
             raise ConvergenceError("step 7 did not converge", step=7)
-        return super().run(until, save_every, path, progress)
+        return super().run(until, save_every, path, progress, overwrite)
 
 
 @pytest.fixture(autouse=True)

@@ -293,6 +293,7 @@ def test_a_run_killed_in_the_middle_of_writing_keeps_what_was_whole(tmp_path: Pa
         class Counting:
             def __init__(self, file): self.file, self.flushes = file, 0
             def __getitem__(self, name): return self.file[name]
+            def __getattr__(self, name): return getattr(self.file, name)
             def flush(self):
                 self.file.flush()
                 if self.flushes == {which}: kill()

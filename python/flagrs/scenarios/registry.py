@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, ParamSpec
 
-from flagrs.errors import SceneError, unknown_option
+from flagrs.errors import SceneError, faulty, shown, unknown_option
 from flagrs.scene import Scene
 
 P = ParamSpec("P")
@@ -56,7 +56,11 @@ def build(name: str, options: Mapping[str, Any] | None = None) -> Scene:
     for option, value in options.items():
         if option not in known:
             raise unknown_option(option, known, value)
-    return make(**options)
+    try:
+        return make(**options)
+    except (TypeError, OverflowError, ZeroDivisionError) as error:
+        given = ", ".join(f"{option}={shown(value)}" for option, value in options.items())
+        raise faulty(name, f"{given}: {error}", "given parameters of the right kind") from None
 
 
 def _find(name: str) -> Callable[..., Scene]:

@@ -12,7 +12,7 @@ from flagrs.scene.motor import Motor
 from flagrs.scene.plan import Plan
 from flagrs.scene.rod import Rod
 from flagrs.scene.scene import Scene
-from flagrs.scene.signal import Signal, Table, signal_value
+from flagrs.scene.signal import Signal, Table, TimeFunction, signal_value
 from flagrs.scene.vector_signal import VectorSignal
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "Scene",
     "Signal",
     "Table",
+    "TimeFunction",
     "VectorSignal",
     "signal_value",
 ]

@@ -48,7 +48,7 @@ class Clamp(Part):
     axes : str
         Coordinates of the nodes that are held, some of ``xyz``: ``xyz`` clamps (without edges: pins) them,
         ``yz`` lets them slide along x, ``z`` lets them slide in the plane of x and y.
-    angular_velocity : float, Table or function of time
+    angular_velocity : float, Table, TimeFunction or function of time
         Angular velocity of the clamped edges about their tangent, right-handed [rad/s].
     velocity : vector, Table of vectors, or function of time
         Velocity (3,) of the clamped nodes [m/s].

@@ -19,6 +19,9 @@ EPSILON_RATIO = {"slender": math.sqrt(math.e), "seed": 1.031}
 #: Immersed nodes from which on a step takes less time without the segments' matrix (docs/performance.md).
 CROSSOVER = 500
 
+#: Density of water, for the Reynolds number where no other is given [kg/m^3].
+WATER = 1000.0
+
 _length = Array(((),), Bounds("m", above=0.0))
 
 
@@ -61,11 +64,12 @@ class Fluid(Part):
     far_field_nodes : int or None
         Immersed nodes from which on the method is used and the dense matrix of the segments is never formed;
         0: always. None: 500, where a step takes the same time either way.
+    density : float or None
+        Density of the fluid [kg/m^3], for buoyancy under gravity (where it must be given; 0: no buoyancy) and
+        for the Reynolds number that a run watches. None: 1000, that of water, for the latter.
     background : sequence of flows
         Flows there are without the filaments, which add up: `LinearFlow`, `PoiseuilleFlow`, `FlowFunction`. A
         single one may stand for a list of one. Drag acts on velocities relative to them.
-    density : float
-        Density of the fluid [kg/m^3], for buoyancy under gravity.
     """
 
     viscosity: Annotated[float, number(Bounds("Pa s", above=0.0, at_most=1e4, if_large="given in mPa s?"))]
@@ -76,7 +80,17 @@ class Fluid(Part):
     wavelength: Annotated[float | None, optional_number(Bounds("m", above=0.0))] = None
     far_field_error: Annotated[float, number(Bounds("1", at_least=1e-9, at_most=0.1))] = 1e-6
     far_field_nodes: Annotated[int | None, PlainValidator(_count)] = None
-    density: Annotated[float, number(Bounds("kg/m^3", at_least=0.0, at_most=3e4))] = 0.0
+    density: Annotated[float | None, optional_number(Bounds("kg/m^3", at_least=0.0, at_most=3e4))] = None
+
+    @property
+    def density_for_buoyancy(self) -> float:
+        """Density that gravity acts on [kg/m^3]."""
+        return 0.0 if self.density is None else self.density
+
+    @property
+    def density_for_inertia(self) -> float:
+        """Density of the Reynolds number [kg/m^3]."""
+        return WATER if self.density is None else self.density
 
     background: tuple[Flow, ...] = ()
 

@@ -1,4 +1,4 @@
-"""The robot's head as the supplementary text models it: drag on one node, a couple on its two neighbours."""
+"""A robot's head: drag on one node, and a couple against its turning about any axis."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from flagrs.scene.values import Bounds, Index, number
 
 
 class Head(Part):
-    """A spherical head at a node with exactly two neighbours (supplementary text, equations 15 to 18).
+    """A spherical head at a node with exactly two neighbours (docs/theory/fluid.md, section 9).
+
+    It is fixed to both edges that meet there, but not to the shaft of a motor that sits at its own node, and
+    resists turning about any axis: rigid turns across the edges as in the supplementary text (equations 16
+    to 18), turns about the edges by their material frames.
 
     Attributes
     ----------

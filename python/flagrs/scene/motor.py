@@ -27,9 +27,9 @@ class Motor(Part):
         Edge of the rod that is turned; one of the two edges of the hinge at `node`.
     rod : int
         Index of the rod in the scene.
-    speed : float, Table or function of time
+    speed : float, Table, TimeFunction or function of time
         Angular velocity of the shaft relative to the housing [rad/s]; see `flagrs.rpm`.
-    torque : float, Table or function of time
+    torque : float, Table, TimeFunction or function of time
         Torque on the shaft, and opposite on the housing [N m]. Exactly one of `speed` and `torque` is given.
     """
 

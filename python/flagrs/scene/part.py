@@ -30,6 +30,20 @@ class Part(BaseModel):
         fields = {name: getattr(self, name) for name in type(self).model_fields}
         return type(self)(**{**fields, **changes})
 
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        """Take over what was pickled, with arrays as read-only as they were."""
+        super().__setstate__(state)
+        self._lock()
+
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
+        """Return the part itself, as it cannot change."""
+        return self
+
+    def _lock(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
     def __eq__(self, other: object) -> bool:
         """Compare field by field; arrays are equal when every bit is."""
         return isinstance(other, Part) and _key(self) == _key(other)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flagrs.memory import in_words
+from flagrs.scene.plausibility import Scales, implausible, scales_of
 from flagrs.scene.values import FloatArray
 
 if TYPE_CHECKING:
@@ -19,6 +21,9 @@ PAIR_FLOPS = 200
 HINGE_FLOPS = 6000
 #: Operations of the fluid's products in a step per node, without a matrix: some thirty of about 10 us.
 FAST_FLOPS = 2.4e6
+#: Memory of a node's share of matrices, factors and histories, measured; vectors that GMRES keeps.
+NODE_BYTES = 20_000
+KRYLOV_VECTORS = 241
 #: Newton iterations of a typical step, and products with the fluid matrix in each.
 NEWTON_ITERATIONS = 2
 PRODUCTS = 8
@@ -44,6 +49,8 @@ class Plan:
         Rows of the dense fluid matrix; 0 without one.
     far_field_error : float or None
         Relative error of fluid products made without a matrix; None where there are none.
+    scales : Scales
+        Extent, slenderness, Reynolds and sperm number.
     flops : float
         Estimated floating-point operations of a step, to a factor of two or three.
     warnings : tuple of str
@@ -59,6 +66,7 @@ class Plan:
     left_out: tuple[str, ...]
     fluid_matrix: int
     far_field_error: float | None
+    scales: Scales
     flops: float
     warnings: tuple[str, ...]
 
@@ -66,6 +74,20 @@ class Plan:
     def fluid_bytes(self) -> int:
         """Memory of the dense fluid matrix [bytes]."""
         return 8 * self.fluid_matrix**2
+
+    @property
+    def memory(self) -> float:
+        """Memory of a simulation [bytes], to a factor of two.
+
+        The dense fluid matrix in double and single precision, the vectors of the Krylov method, and some
+        `NODE_BYTES` a node for everything sparse.
+        """
+        vectors = (
+            8.0
+            * KRYLOV_VECTORS
+            * (3 * self.immersed_nodes if self.fluid_matrix or self.far_field_error else 0)
+        )
+        return 1.5 * self.fluid_bytes + vectors + NODE_BYTES * self.nodes
 
     def __str__(self) -> str:
         """Return the plan for a person to read."""
@@ -76,12 +98,14 @@ class Plan:
         ]
         if self.fluid_matrix:
             lines.append(
-                f"fluid:    dense {self.fluid_matrix} x {self.fluid_matrix}, {_size(self.fluid_bytes)}"
+                f"fluid:    dense {self.fluid_matrix} x {self.fluid_matrix}, {in_words(self.fluid_bytes)}"
             )
         elif self.far_field_error is not None:
             lines.append(
                 f"fluid:    products to {self.far_field_error:g} by fast multipoles, without a matrix"
             )
+        lines.append(f"scales:   {self.scales}")
+        lines.append(f"memory:   about {in_words(self.memory)}")
         lines.append(f"a step:   about {self.flops / 1e6:.3g} million floating-point operations")
         return "\n".join([*lines, *(f"warning:  {warning}" for warning in self.warnings)])
 
@@ -94,6 +118,7 @@ def plan_of(scene: Scene) -> Plan:
     fast = scene.fluid is not None and fluid_model == "RSS" and immersed >= scene.fluid.crossover
     dense = 3 * immersed if fluid_model == "RSS" and not fast else 0
     present, absent = _terms(scene)
+    scales = scales_of(scene)
     return Plan(
         nodes=scene.node_count,
         edges=scene.edge_count,
@@ -105,7 +130,8 @@ def plan_of(scene: Scene) -> Plan:
         fluid_matrix=dense,
         far_field_error=scene.fluid.far_field_error if scene.fluid is not None and fast else None,
         flops=_flops(scene, dense) + (FAST_FLOPS * immersed if fast else 0.0),
-        warnings=tuple(_warnings(scene)),
+        scales=scales,
+        warnings=(*_warnings(scene), *implausible(scene, scales)),
     )
 
 
@@ -140,7 +166,7 @@ def _terms(scene: Scene) -> tuple[list[str], list[str]]:
         "background flow": f"{len(fluid.background)} background flows" if fluid and fluid.background else "",
         "contact": f"contact ({scene.contact.method})" if scene.contact else "",
         "gravity": f"gravity {np.linalg.norm(scene.gravity):g} m/s^2" if heavy else "",
-        "buoyancy": "buoyancy" if heavy and fluid and fluid.density > 0.0 else "",
+        "buoyancy": "buoyancy" if heavy and fluid and fluid.density_for_buoyancy > 0.0 else "",
     }
     elastic = "stretching, bending, twisting" if scene.hinge_count else "stretching"
     return [elastic, *filter(None, words.values())], [term for term, text in words.items() if not text]
@@ -161,10 +187,6 @@ def _warnings(scene: Scene) -> list[str]:
             found += _conditioning(number, ratio[rod.immersed_array()])
     if scene.head is not None and fluid is None:
         found.append("the head feels no drag, because the scene has no fluid")
-    if fluid is not None and fluid.density > 0.0 and not scene.gravity.any():
-        found.append(
-            f"the fluid's density of {fluid.density:g} kg/m^3 is not used, because there is no gravity"
-        )
     return found
 
 
@@ -181,11 +203,3 @@ def _conditioning(rod: int, ratio: FloatArray) -> list[str]:
         f"{condition:.0e}) and the force density oscillates; use edges of at least {CURED_EDGE:g} epsilon, "
         "or a smaller epsilon"
     ]
-
-
-def _size(count: float) -> str:
-    for unit in ("bytes", "kB", "MB"):
-        if count < 1000:
-            return f"{count:.3g} {unit}"
-        count /= 1000
-    return f"{count:.3g} GB"

@@ -63,7 +63,8 @@ class Rod(Part):
     GJ : float, ndarray or None
         Twisting stiffness, one or (H,) [N m^2]; None: G pi r^4 / 2.
     natural_curvature : ndarray or None
-        Integrated natural curvature (2,) or (H, 2) at the hinges [1]; None: that of the rest shape.
+        Integrated natural curvature (2,) or (H, 2) at the hinges, in the material frame halfway between the
+        two edges [1]; None: that of the rest shape.
     natural_twist : float, ndarray or None
         Natural twist at the hinges, one or (H,) [rad]; None: that of the rest shape.
     theta : ndarray or None
@@ -215,6 +216,10 @@ class Rod(Part):
 
     def hinge_array(self) -> IntArray:
         """Return the two edges (H, 2) of each hinge."""
+        if self.hinges is None and self.edges is None:
+            return rod_topology.chain(
+                len(self.nodes) - 1
+            )  # the same at once, for the many rods that are chains
         if self.hinges is None:
             return rod_topology.all_hinges(self.edge_array(), len(self.nodes))
         return self.hinges
@@ -259,7 +264,8 @@ class Rod(Part):
         elif np.ndim(self.EI) < 2:
             plain = np.broadcast_to(self.EI, count)
         else:
-            return np.broadcast_to(self.EI, (count, 2, 2)).astype(np.float64)
+            given = np.broadcast_to(self.EI, (count, 2, 2)).astype(np.float64)
+            return 0.5 * (given + given.transpose(0, 2, 1))  # a turned tensor is symmetric but for round-off
         return plain[:, None, None] * np.eye(2)
 
     def GJ_array(self) -> FloatArray:
@@ -293,7 +299,5 @@ def _count(contour: float, edge_length: float | None, edge_count: int | None) ->
             allowed="exactly one of edge_length [m] and edge_count",
         )
     return (
-        shapes.whole("edge_count", edge_count)
-        if edge_length is None
-        else shapes.edge_count(contour, edge_length)
+        shapes.checked_count(edge_count) if edge_length is None else shapes.edge_count(contour, edge_length)
     )

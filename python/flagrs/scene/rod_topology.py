@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -9,10 +10,13 @@ import numpy as np
 from flagrs.scene.values import IntArray
 
 
+@lru_cache(maxsize=256)
 def chain(node_count: int) -> IntArray:
-    """Return the edges (node_count - 1, 2) of a chain of nodes."""
+    """Return the edges (node_count - 1, 2) of a chain of nodes; kept, since scenes of many rods ask often."""
     first = np.arange(node_count - 1, dtype=np.int64)
-    return np.stack([first, first + 1], axis=1)
+    edges: IntArray = np.stack([first, first + 1], axis=1)
+    edges.setflags(write=False)
+    return edges
 
 
 def edges_at_nodes(edges: IntArray, node_count: int) -> list[list[int]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -21,7 +22,7 @@ from flagrs.scene.motor import Motor
 from flagrs.scene.part import Part
 from flagrs.scene.plan import Plan, plan_of
 from flagrs.scene.rod import Rod
-from flagrs.scene.values import Array, Bounds, FloatArray, origin
+from flagrs.scene.values import Array, Bounds, FloatArray, IntArray, origin
 
 
 class Scene(Part):
@@ -84,28 +85,39 @@ class Scene(Part):
             raise combined(found)
         return self
 
+    @cached_property
+    def _offsets(self) -> IntArray:
+        """First node, edge and hinge (R + 1, 3) of every rod in the scene, and how many there are."""
+        counts = [[0, 0, 0]]
+        counts += [[len(rod.nodes), len(rod.edge_array()), len(rod.hinge_array())] for rod in self.rods]
+        return np.cumsum(counts, axis=0, dtype=np.int64)
+
     @property
     def node_count(self) -> int:
         """Number of nodes of all rods."""
-        return sum(len(rod.nodes) for rod in self.rods)
+        return int(self._offsets[-1, 0])
 
     @property
     def edge_count(self) -> int:
         """Number of edges of all rods."""
-        return sum(len(rod.edge_array()) for rod in self.rods)
+        return int(self._offsets[-1, 1])
 
     @property
     def hinge_count(self) -> int:
         """Number of hinges of all rods."""
-        return sum(len(rod.hinge_array()) for rod in self.rods)
+        return int(self._offsets[-1, 2])
 
     def node_offset(self, rod: int) -> int:
         """Return the scene's number of the first node of a rod."""
-        return sum(len(other.nodes) for other in self.rods[:rod])
+        return int(self._offsets[rod, 0])
 
     def edge_offset(self, rod: int) -> int:
         """Return the scene's number of the first edge of a rod."""
-        return sum(len(other.edge_array()) for other in self.rods[:rod])
+        return int(self._offsets[rod, 1])
+
+    def hinge_offset(self, rod: int) -> int:
+        """Return the scene's number of the first hinge of a rod."""
+        return int(self._offsets[rod, 2])
 
     def node_array(self) -> FloatArray:
         """Return the initial positions (N, 3) of all nodes [m]."""

@@ -26,7 +26,7 @@ def problems(scene: Scene) -> list[SceneError]:
     found = list(_indices(scene))
     if found:
         return found
-    return [*_head(scene), *_motors(scene), *_clamps(scene)]
+    return [*_head(scene), *_motors(scene), *_clamps(scene), *_buoyancy(scene)]
 
 
 def _indices(scene: Scene) -> Iterator[SceneError]:
@@ -56,15 +56,35 @@ def _named_parts(scene: Scene) -> Iterator[tuple[str, Head | Motor | Clamp | Loa
             yield f"{name}[{position}]", part
 
 
+def _buoyancy(scene: Scene) -> Iterator[SceneError]:
+    fluid = scene.fluid
+    if fluid is not None and fluid.density is None and scene.gravity.any():
+        allowed = "given [kg/m^3] in a scene with gravity: 1000 for water, 0 to leave buoyancy out"
+        yield not_allowed("fluid.density", None, allowed)
+
+
 def _head(scene: Scene) -> Iterator[SceneError]:
     if scene.head is None:
         return
     rod = scene.rods[scene.head.rod]
-    neighbours = len(edges_at_nodes(rod.edge_array(), len(rod.nodes))[scene.head.node])
-    if neighbours != 2:
+    meeting = set(edges_at_nodes(rod.edge_array(), len(rod.nodes))[scene.head.node])
+    if len(meeting) != 2:
         yield not_allowed(
-            "head.node", scene.head.node, f"a node with exactly two neighbours, not {neighbours}"
+            "head.node", scene.head.node, f"a node with exactly two neighbours, not {len(meeting)}"
         )
+    elif not any(meeting == set(hinge) for hinge in rod.hinge_array().tolist()):
+        # Without one the head would resist the mean turning of two edges that turn as they like.
+        yield faulty("head.node", "no hinge joins the two edges at the head", "a node with a hinge")
+
+
+def edges_of_head(scene: Scene, head: Head) -> list[int]:
+    """Return the edges of its rod that are fixed to a head: those at its node but shafts of motors there."""
+    rod = scene.rods[head.rod]
+    here = (motor for motor in scene.motors if (motor.rod, motor.node) == (head.rod, head.node))
+    shafts = {motor.shaft for motor in here}
+    return [
+        edge for edge in edges_at_nodes(rod.edge_array(), len(rod.nodes))[head.node] if edge not in shafts
+    ]
 
 
 def _motors(scene: Scene) -> Iterator[SceneError]:

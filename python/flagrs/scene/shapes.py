@@ -19,6 +19,10 @@ Vector = Sequence[float] | npt.NDArray[np.float64]
 _vector = Array(((3,),), Bounds("m"))
 
 
+#: More edges than any rod has, below what would exhaust memory before it is looked at.
+MOST_EDGES = 10_000_000
+
+
 def vector(field: str, value: Vector) -> FloatArray:
     """Return a (3,) array of finite numbers; raise SceneError naming the field otherwise."""
     return np.asarray(_named(field, _vector, value))
@@ -48,13 +52,24 @@ def _named(field: str, check: Array, value: Vector | float) -> float | FloatArra
         raise error.within(field) from None
 
 
+def checked_count(value: object) -> int:
+    """Return a number of edges; raise SceneError for one that is no count or larger than any computation."""
+    count = whole("edge_count", value)
+    if count > MOST_EDGES:
+        raise not_allowed("edge_count", value, f"at most {MOST_EDGES}")
+    return count
+
+
 def edge_count(contour: float, edge_length: float) -> int:
     """Return how many edges of at least `edge_length` fit into a contour, both in metres.
 
     The quotient is rounded down, as in the supplementary text; 1e-9 of slack keeps 0.3 m / 0.1 m at 3.
     """
     edge_length = length("edge_length", edge_length)
-    count = math.floor(contour / edge_length * (1.0 + 1e-9))
+    ratio = contour / edge_length * (1.0 + 1e-9)
+    if ratio >= MOST_EDGES:
+        raise not_allowed("edge_length", edge_length, f"such that there are at most {MOST_EDGES} edges")
+    count = math.floor(ratio)
     if count < 1:
         raise not_allowed(
             "edge_length", edge_length, f"at most the contour length, {contour:g} m", "given in mm?"

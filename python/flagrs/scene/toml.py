@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from copy import deepcopy
@@ -10,18 +12,37 @@ from typing import Any
 
 import tomli_w
 
-from flagrs.errors import SceneError, faulty, not_allowed, unknown_option
+from flagrs.errors import (
+    FileMissingError,
+    FlagrsError,
+    SceneError,
+    faulty,
+    file_error,
+    not_allowed,
+    unknown_option,
+)
 from flagrs.scene.codec import plain
 from flagrs.scene.material import Material
 from flagrs.scene.rod import Rod
 from flagrs.scene.scene import Scene
+
+#: Largest file [bytes], and deepest nesting of tables and lists in one: a scene has rods, nodes, coordinates.
+LARGEST_FILE = 1 << 26
+DEEPEST = 16
+
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_DEEP_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]{{0,8}}\.[ \t]{{0,8}}{_PART}){{{DEEPEST}}}")
 
 _SHAPES: dict[str, Callable[..., Rod]] = {"helix": Rod.helix, "straight": Rod.straight}
 
 
 def write(scene: Scene, path: Path) -> None:
     """Write a scene to a TOML file."""
-    path.write_text(tomli_w.dumps(plain(scene)), encoding="utf-8")
+    text = tomli_w.dumps(plain(scene))
+    try:
+        path.write_text(text, encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise file_error(path, error, "cannot be written") from None
 
 
 def read(path: Path, changes: Mapping[str, Any] | None = None) -> Scene:
@@ -39,14 +60,62 @@ def read(path: Path, changes: Mapping[str, Any] | None = None) -> Scene:
     ------
     SceneError
         If the file is not TOML, or does not describe a scene.
+    FileError
+        If it cannot be read; an `OSError`.
     """
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"{path}: not a TOML file: {error}") from None
+    data = _parsed(path)
     if "scenario" in data:
         return _from_scenario(data, changes or {})
     return from_mapping(changed(data, changes or {}))
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file, after checking their size, depth and numbers."""
+    try:
+        if not path.is_file():
+            raise FileMissingError(path, "no such file" if not path.exists() else "not a file", errno.ENOENT)
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise SceneError(f"{path}: {size} bytes; must be at most {LARGEST_FILE}")
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path}: not a TOML file: {error}") from None
+    except (OSError, ValueError) as error:
+        if isinstance(error, FlagrsError):
+            raise
+        raise file_error(path, error, "cannot be read") from None
+    if _DEEP_KEY.search(text):  # parsing it would take minutes
+        raise SceneError(f"{path}: a key of more than {DEEPEST} levels")
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path}: not a TOML file: {error}") from None
+    except RecursionError:
+        raise SceneError(f"{path}: nested deeper than {DEEPEST} levels") from None
+    except ValueError as error:  # numbers of thousands of digits, dates that do not exist
+        raise SceneError(f"{path}: a value that cannot be: {error}") from None
+    _check_values(data, "")
+    return data
+
+
+def _check_values(value: Any, path: str, depth: int = 0) -> None:
+    """Raise SceneError for what TOML can say and no scene can: huge integers, dates, odd names."""
+    if depth > DEEPEST:
+        raise SceneError(f"{path[:80]}: nested deeper than {DEEPEST} levels")
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if not key.isidentifier() or key == "self":
+                raise unknown_option(f"{path}{'.' if path else ''}{key!r}", ["the fields of a scene"], item)
+            _check_values(item, f"{path}.{key}" if path else key, depth + 1)
+    elif isinstance(value, list):
+        for number, item in enumerate(value):
+            _check_values(item, f"{path}[{number}]", depth + 1)
+    elif isinstance(value, int) and abs(value) >= 2**63:
+        raise not_allowed(path, value, "an integer of 64 bits")
+    elif isinstance(value, str) and "\0" in value:
+        raise not_allowed(path, value, "text without the character NUL")
+    elif not isinstance(value, int | float | str):
+        raise not_allowed(path, value, "a number, text, list or table")
 
 
 def from_mapping(data: Mapping[str, Any]) -> Scene:
@@ -62,7 +131,12 @@ def _from_scenario(data: dict[str, Any], changes: Mapping[str, Any]) -> Scene:
 
     for key in data.keys() - {"scenario", "parameters"}:
         raise unknown_option(key, ["scenario", "parameters"], data[key])
-    return scenarios.build(data["scenario"], changed(data.get("parameters", {}), changes))
+    name, parameters = data["scenario"], data.get("parameters", {})
+    if not isinstance(name, str):
+        raise not_allowed("scenario", name, "the name of a scenario")
+    if not isinstance(parameters, dict):
+        raise not_allowed("parameters", parameters, "a table of parameters")
+    return scenarios.build(name, changed(parameters, changes))
 
 
 def _rod(entry: Any, path: str) -> Any:
@@ -70,7 +144,8 @@ def _rod(entry: Any, path: str) -> Any:
     if not isinstance(entry, dict) or "shape" not in entry:
         return entry
     options = {name: value for name, value in entry.items() if name != "shape"}
-    make = _SHAPES.get(entry["shape"])
+    shape = entry["shape"]
+    make = _SHAPES.get(shape) if isinstance(shape, str) else None
     if make is None:
         raise not_allowed(f"{path}.shape", entry["shape"], " or ".join(repr(shape) for shape in _SHAPES))
     try:

@@ -84,7 +84,10 @@ class Array:
             worst = np.unravel_index(int(np.argmin(inside)), array.shape)
             index = f"[{', '.join(str(int(i)) for i in worst)}]" if array.ndim else ""
             bad = float(array[worst])
-            raise not_allowed(index, bad, str(self.bounds), self.bounds.hint(bad))
+            allowed = str(self.bounds)
+            if not math.isfinite(bad) and "finite" not in allowed:
+                allowed = f"finite and {allowed}"
+            raise not_allowed(index, bad, allowed, self.bounds.hint(bad))
         return float(array) if array.ndim == 0 else read_only(array)
 
     def _shape_text(self) -> str:

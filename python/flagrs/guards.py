@@ -1,0 +1,159 @@
+"""Guards: what a run warns of, each once, with time, place, number and what to do about it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from flagrs.budget import budget_of
+from flagrs.scene import Scene
+from flagrs.scene.values import FloatArray
+
+
+class FlagrsWarning(UserWarning):
+    """Base class of every warning flagrs gives: the result may not be what it seems."""
+
+
+class EnergyWarning(FlagrsWarning):
+    """Energy that grows without input, or that the steps lose."""
+
+
+class MeshWarning(FlagrsWarning):
+    """Hinges folded beyond what the mesh carries, or edges below the regularization."""
+
+
+class StrainWarning(FlagrsWarning):
+    """Edges stretched beyond what linear elasticity describes."""
+
+
+class StabilityWarning(FlagrsWarning):
+    """Steps of the explicit scheme that are longer than it is known to be stable with."""
+
+
+class ReynoldsWarning(FlagrsWarning):
+    """Motion too fast for a fluid without inertia."""
+
+
+#: Share of the energy that has passed which steps may lose, or make.
+MOST_LOST, MOST_MADE = 0.2, 0.05
+#: Bending beyond the natural shape [rad] from which a hinge overstates the energy of the arc it stands for by
+#: more than a fifth: (2 tan(phi/2))^2 over phi^2 is 1.22 at 60 degrees, and 1.62 at 90.
+MOST_BENDING = np.pi / 3.0
+#: Strain beyond which linear elasticity is another material.
+MOST_STRAIN = 0.2
+#: Regularization over the length of an edge.
+MOST_REGULARIZATION = 1.0
+#: Reynolds number.
+MOST_REYNOLDS = 1.0
+
+
+@dataclass(frozen=True)
+class Notice:
+    """One warning of a run.
+
+    Attributes
+    ----------
+    kind : str
+        ``energy made``, ``energy lost``, ``bending``, ``strain``, ``regularization`` or ``reynolds``.
+    time : float
+        Simulated time [s] of the worst value so far.
+    value : float
+        The value: a share, an angle [rad], a strain or a ratio.
+    message : str
+        What it means and what to do.
+    """
+
+    kind: str
+    time: float
+    value: float
+    message: str
+
+
+CLASSES = {
+    "energy made": EnergyWarning,
+    "energy lost": EnergyWarning,
+    "bending": MeshWarning,
+    "strain": StrainWarning,
+    "regularization": MeshWarning,
+    "reynolds": ReynoldsWarning,
+}
+
+
+def notices(account: FloatArray, scene: Scene) -> Iterator[Notice]:
+    """Yield what there is to warn of in a native account (42,) of a scene."""
+    time = float(account[0])
+    defect = float(budget_of(account[None]).relative_defect[0])
+    if defect < -MOST_MADE:
+        text = f"by t = {time:g} s {-defect:.2g} of all energy came from nowhere: the steps are unstable; "
+        yield Notice("energy made", time, -defect, text + "use a smaller dt, or rtol")
+    if defect > MOST_LOST:
+        text = f"by t = {time:g} s the steps have lost {defect:.2g} of all energy: they are too long; "
+        yield Notice("energy lost", time, defect, text + "use rtol, or a smaller dt")
+    bending, strain, width, reynolds = account[29:41].reshape(4, 3)
+    if bending[0] > MOST_BENDING:
+        yield _notice(
+            "bending",
+            bending,
+            f"hinge {bending[1]:.0f} is bent by {np.degrees(bending[0]):.0f} degrees beyond its natural "
+            f"shape, where its energy is {_overstated(bending[0]):.2g} times that of an arc; use shorter "
+            "edges",
+        )
+    if strain[0] > MOST_STRAIN:
+        yield _notice(
+            "strain",
+            strain,
+            f"edge {strain[1]:.0f} is strained by {100.0 * strain[0]:.0f} %: Hooke's law holds for small "
+            "strains; use a stiffer material or smaller forces",
+        )
+    if width[0] > MOST_REGULARIZATION:
+        yield _notice(
+            "regularization",
+            width,
+            f"immersed edge {width[1]:.0f} is shorter than the regularization (a factor of {width[0]:.3g}): "
+            "the force density oscillates; use longer edges or a smaller epsilon",
+        )
+    if reynolds[0] > MOST_REYNOLDS:
+        density = 0.0 if scene.fluid is None else scene.fluid.density_for_inertia
+        yield _notice(
+            "reynolds",
+            reynolds,
+            f"the Reynolds number at node {reynolds[1]:.0f} is {reynolds[0]:.3g} (a density of {density:g} "
+            "kg/m^3): the fluid's inertia, which is left out, is no longer small",
+        )
+
+
+def _notice(kind: str, extreme: FloatArray, text: str) -> Notice:
+    return Notice(kind, float(extreme[2]), float(extreme[0]), f"at t = {extreme[2]:g} s {text}")
+
+
+def _overstated(angle: float) -> float:
+    return float((2.0 * np.tan(angle / 2.0) / angle) ** 2)
+
+
+class Guards:
+    """The guards of one run: each kind warns once."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._found: dict[str, Notice] = {}
+
+    def look(self, account: FloatArray, end: bool = False) -> None:
+        """Warn of what is new in an account; of lost energy at the end of a run only.
+
+        A start from rest may lose much of the little energy that has passed by then.
+        """
+        for notice in notices(account, self._scene):
+            if notice.kind == "energy lost" and not end:
+                continue
+            new = notice.kind not in self._found
+            self._found[notice.kind] = notice
+            if new:
+                warnings.warn(notice.message, CLASSES[notice.kind], stacklevel=3)
+
+    @property
+    def found(self) -> tuple[Notice, ...]:
+        """Everything warned of so far, with the worst value each."""
+        return tuple(self._found.values())

@@ -1,0 +1,82 @@
+//! Whether the work of Newton's method still moves the time on, and what to say where contact has stalled.
+//!
+//! Contact far too soft or far too stiff for the forces it bears, or of a tolerance far too fine, lets a step be solved only where it is
+//! minute: the run would not fail, and not end either.
+
+use super::failure::StepError;
+use super::simulation::Simulation;
+use crate::contact::potential::{BarrierLaw, ContactForce};
+
+/// Newton iterations after which progress is looked at.
+const WINDOW: u64 = 2000;
+/// Least progress of an iteration, in steps of fixed size: a run of a thousand such steps would take 10^8 iterations.
+const LEAST: f64 = 1e-5;
+
+/// Work and time when progress was last looked at.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Progress {
+    iterations: u64,
+    time: f64,
+}
+
+impl Progress {
+    /// Starts anew at this number of iterations and this time (s).
+    pub fn from(iterations: u64, time: f64) -> Self {
+        Self { iterations, time }
+    }
+
+    /// By how much the time (s) has moved on where that is too little for the iterations made, given the size `dt` of a fixed step (s).
+    pub fn stalled(&mut self, iterations: u64, time: f64, dt: f64) -> Option<f64> {
+        if iterations < self.iterations + WINDOW {
+            return None;
+        }
+        let advanced = time - self.time;
+        let most = (iterations - self.iterations) as f64 * LEAST * dt;
+        *self = Self::from(iterations, time);
+        (advanced < most).then_some(advanced)
+    }
+}
+
+impl Simulation {
+    /// An error if contact has stalled.
+    pub(super) fn check_progress(&mut self) -> Result<(), StepError> {
+        let Some(law) = self.model.barrier() else { return Ok(()) };
+        let (iterations, time) = (self.statistics.newton_iterations, self.state.time);
+        let Some(advanced) = self.progress.stalled(iterations, time, self.dt) else { return Ok(()) };
+        let dofs = self.model.network.node_dofs();
+        let pushing = self.balance.barrier.as_mut().map(|barrier| barrier.forces(law, dofs, &self.state.q));
+        let size = |force: &ContactForce| force.contact.force;
+        let strongest = pushing.unwrap_or_default().into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
+        let Some(strongest) = strongest else { return Ok(()) };
+        let reason = stall(law, &strongest, advanced);
+        let worst = dofs[strongest.contact.nodes[0]];
+        Err(self.convergence_error(self.dt, f64::NAN, WINDOW as usize, Some(worst), reason))
+    }
+}
+
+/// What to say of a stall whose strongest contact is this.
+fn stall(law: &BarrierLaw, strongest: &ContactForce, advanced: f64) -> String {
+    let [a, b] = strongest.bodies;
+    let pair = strongest.indices(law).map(|body| body as usize);
+    let (force, stiffness) = (strongest.contact.force, law.stiffness(pair));
+    let friction = if law.has_friction() { ", a larger slip_velocity" } else { "" };
+    format!(
+        "contact has stalled: {WINDOW} Newton iterations moved the time on by {advanced:.1e} s; {a} and {b} press with {force:.2e} N, which          a stiffness of about {:.1e} Pa would hold at the sum of their radii where it is {stiffness:.1e} Pa; give another          Contact.stiffness (None takes it from the scene), a larger Contact.tolerance than {}{friction}, or smaller loads",
+        law.stiffness_to_hold(pair, force),
+        law.delta(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_without_progress_is_a_stall_and_slow_progress_is_not() {
+        let mut progress = Progress::from(10, 1.0);
+        assert_eq!(progress.stalled(10 + WINDOW - 1, 1.0, 0.1), None);
+        let least = WINDOW as f64 * LEAST * 0.1;
+        assert!(progress.stalled(10 + WINDOW, 1.0 + 0.5 * least, 0.1).is_some());
+        assert_eq!(progress.stalled(10 + 2 * WINDOW, 1.0 + 2.0 * least, 0.1), None);
+    }
+}

@@ -1,0 +1,217 @@
+"""What a run says of itself: energy budget, balances, and warnings when there is reason and only then."""
+
+import warnings
+
+import flagrs
+import numpy as np
+import pytest
+from flagrs.flow import immersed_edges
+from flagrs.guards import notices
+
+SOFT = flagrs.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1200.0)
+
+
+def straight(count: int = 10, length: float = 0.1, radius: float = 1e-3, **options) -> flagrs.Rod:
+    return flagrs.Rod.straight(length=length, edge_count=count, radius=radius, material=SOFT, **options)
+
+
+def held(*nodes: int, **options) -> flagrs.Clamp:
+    return flagrs.Clamp(nodes=nodes, edges=(0,) if nodes[0] == 0 else (), **options)
+
+
+def test_energy_budget_of_the_robot_closes_and_agrees_with_its_read_outs():
+    simulation = flagrs.Simulation(flagrs.scenarios.robot(contact=False), dt=0.02)
+    trajectory = simulation.run(until=1.0, save_every=0.02, path=False)
+    budget = trajectory.energy_budget()
+    dt = np.diff(trajectory.time)
+    # Work of constant speed over a step is exact, as is the dissipation of forces by the step's velocities.
+    work = np.cumsum(trajectory.power()[1:] * dt)
+    assert budget.sources["motors"][1:] == pytest.approx(work, rel=1e-9)
+    edges, _ = immersed_edges(trajectory.scene)
+    forces = [
+        flagrs.fluid.hat_weights(x, edges, f) for x, f in zip(trajectory.nodes, trajectory.force_density)
+    ]
+    taken = np.cumsum([(f * v).sum() for f, v in zip(forces[1:], trajectory.velocities[1:])] * dt)
+    # The step's weights are those of its first geometry.
+    assert budget.sinks["fluid"][1:] == pytest.approx(taken, rel=5e-3)
+    head, velocity = trajectory.scene.head, trajectory.velocities[1:, trajectory.scene.head.node]
+    drag = head.C_t * 6.0 * np.pi * head.radius * (velocity**2).sum(axis=1)
+    assert budget.sinks["head"][-1] > np.sum(drag * dt) > 0.0
+    assert budget.stored["total"][1:] == pytest.approx(trajectory.energy[1:].sum(axis=1), abs=1e-15)
+    assert abs(budget.relative_defect[-1]) < 2e-2
+    assert budget.sinks["twist_drag"][-1] > 0.0 and budget.sources["clamps"][-1] == 0.0
+    assert simulation.warnings == () == trajectory.warnings
+
+
+def test_defect_of_the_budget_is_of_first_order_in_the_step():
+    # An elastic rod straightens: nothing is given, so what it has stored is what is taken.
+    defects = []
+    for dt in (4e-2, 2e-2, 1e-2):
+        simulation = flagrs.Simulation(flagrs.scenarios.relaxing_rod(), dt=dt)
+        trajectory = simulation.run(until=0.8, save_every=0.4, path=False)
+        budget = trajectory.energy_budget()
+        assert sum(part[-1] for part in budget.sources.values()) == 0.0
+        # The second half: the fastest modes of the start, shorter than any of these steps, are gone.
+        defects.append(budget.defect[-1] - budget.defect[-2])
+    assert defects[0] > defects[1] > defects[2] > 0.0
+    assert defects[1] / defects[2] == pytest.approx(2.0, rel=0.3)
+
+
+def test_clamps_give_what_a_turned_flagellum_takes():
+    scene = flagrs.scenarios.clamped_flagella(count=1)
+    simulation = flagrs.Simulation(scene)
+    simulation.step(100)
+    numbers = simulation.statistics
+    assert numbers["energy_given"] > 0.0
+    assert abs(numbers["energy_defect"]) < 2e-2
+    # 0.16 m/s at 10 mm in a fluid ten times as viscous as water: this benchmark is not one of small inertia.
+    assert [notice.kind for notice in simulation.warnings] == ["reynolds"]
+
+
+def test_adaptive_steps_close_the_budget_more_tightly():
+    defect = {}
+    for rtol in (1e-2, 1e-4):
+        simulation = flagrs.Simulation(flagrs.scenarios.robot(contact=False), rtol=rtol)
+        simulation.run(until=1.0, save_every=0.5, path=False)
+        defect[rtol] = abs(simulation.statistics["energy_defect"])
+    assert defect[1e-4] < defect[1e-2] < 5e-2
+
+
+def test_outer_forces_and_torques_of_a_free_robot_vanish():
+    simulation = flagrs.Simulation(flagrs.scenarios.robot(contact=False), dt=0.02)
+    simulation.step(20)
+    numbers = simulation.statistics
+    # The force balance is solved to 1e-8 of the largest force.
+    assert 0.0 < numbers["force_imbalance"] < 1e-6
+    assert 0.0 < numbers["torque_imbalance"] < 1e-6
+
+
+def test_steps_far_too_long_for_what_happens_warn_of_lost_energy():
+    simulation = flagrs.Simulation(flagrs.scenarios.relaxing_rod(), dt=100.0)
+    with pytest.warns(flagrs.EnergyWarning, match=r"have lost .* use rtol, or a smaller dt"):
+        simulation.run(until=200.0, save_every=100.0, path=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulation.run(until=400.0, save_every=100.0, path=False)  # each kind once
+    assert [notice.kind for notice in simulation.warnings] == ["energy lost"]
+    assert simulation.statistics["warnings"] == 1
+
+
+@pytest.mark.parametrize("stored, warned", [(0.4, False), (0.6, True)])
+def test_energy_from_nowhere_is_warned_of(stored: float, warned: bool):
+    # Motors give one joule, the fluid takes half of it: what is stored beyond the other half is from nowhere.
+    account = np.zeros(42)
+    account[1], account[5], account[19], account[23], account[24] = 1.0, 0.5, stored, 1.0, stored
+    found = [notice.kind for notice in notices(account, flagrs.scenarios.robot())]
+    assert found == ["energy made"] * warned
+
+
+@pytest.mark.parametrize("stretch, warned", [(0.15, False), (0.25, True)])
+def test_strain_beyond_a_fifth_warns(stretch: float, warned: bool):
+    clamps = (held(0), held(10, velocity=(0.1 * stretch, 0.0, 0.0)))
+    scene = flagrs.Scene(rods=straight(), clamps=clamps, fluid=flagrs.Fluid(viscosity=1.0))
+    simulation = flagrs.Simulation(scene, dt=0.05)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        trajectory = simulation.run(until=1.0, save_every=0.5, path=False)
+    assert [w.category for w in caught if "strained" in str(w.message)] == [flagrs.StrainWarning] * warned
+    assert ("strain" in [notice.kind for notice in trajectory.warnings]) == warned
+
+
+@pytest.mark.parametrize("edges, warned", [(20, False), (3, True)])
+def test_a_rod_bent_into_a_hook_warns_on_a_mesh_too_coarse_for_it(edges: int, warned: bool):
+    # A load at the tip turns a held rod by more than a right angle: all at one hinge, or spread over twenty.
+    load = flagrs.PointLoad(node=edges, force=(-2e-3, 1e-3, 0.0))
+    scene = flagrs.Scene(
+        rods=straight(edges, radius=0.7e-3), clamps=held(0, 1), loads=load, fluid=flagrs.Fluid(viscosity=1.0)
+    )
+    simulation = flagrs.Simulation(scene, dt=0.05)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation.run(until=5.0, save_every=1.0, path=False)
+    found = [w for w in caught if w.category is flagrs.MeshWarning]
+    assert len(found) == warned
+    if warned:
+        assert "degrees beyond its natural shape" in str(found[0].message)
+
+
+@pytest.mark.parametrize("epsilon, warned", [(5e-3, False), (15e-3, True)])
+def test_edges_below_the_regularization_warn(epsilon: float, warned: bool):
+    fluid = flagrs.Fluid(viscosity=1.0, epsilon=epsilon, density=0.0)
+    load = flagrs.PointLoad(node=5, force=(0.0, 0.0, 1e-5))
+    simulation = flagrs.Simulation(flagrs.Scene(rods=straight(), fluid=fluid, loads=load), dt=1e-3)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation.step()
+    assert ["regularization" in str(w.message) for w in caught] == [True] * warned
+
+
+@pytest.mark.parametrize(
+    "viscosity, density, warned", [(1.0, None, False), (1e-3, None, True), (1e-3, 0.0, False)]
+)
+def test_reynolds_number_above_one_warns(viscosity: float, density: float | None, warned: bool):
+    # A rod of 0.1 m, size 5 mm, towed at 10 mm/s: Re = 1000 * 0.01 * 0.005 / viscosity.
+    fluid = flagrs.Fluid(viscosity=viscosity, density=density)
+    clamp = flagrs.Clamp(nodes=tuple(range(11)), velocity=(0.0, 0.0, 0.01))
+    simulation = flagrs.Simulation(flagrs.Scene(rods=straight(), fluid=fluid, clamps=clamp), dt=1e-3)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation.step()
+    assert [w.category for w in caught] == [flagrs.ReynoldsWarning] * warned
+    if warned:
+        assert simulation.warnings[0].value == pytest.approx(50.0, rel=1e-6)
+
+
+def test_flow_at_the_immersed_nodes_is_their_velocity_and_dry_edges_have_no_part_in_it():
+    scene = flagrs.scenarios.robot(contact=False)
+    simulation = flagrs.Simulation(scene, dt=1e-3)
+    simulation.run(until=0.05, save_every=0.05, path=False)
+    wet = np.unique(simulation.immersed_edges)
+    flow = simulation.flow(simulation.nodes[wet])
+    speed = np.linalg.norm(simulation.velocities[wet], axis=1).max()
+    # No slip, but for the fluid's geometry, which is that of the step's beginning.
+    assert flow == pytest.approx(simulation.velocities[wet], abs=5e-3 * speed)
+    naive = flagrs.fluid.velocity(
+        simulation.nodes[wet],
+        simulation.nodes,
+        simulation.edges,
+        simulation.frame()["force_density"],
+        1.0,
+        1.65e-3,
+    )
+    assert np.abs(naive - simulation.velocities[wet]).max() > 0.05 * speed
+
+
+def test_thrust_of_the_robot_is_the_drag_of_its_head():
+    simulation = flagrs.Simulation(flagrs.scenarios.robot(contact=False), dt=1e-3)
+    trajectory = simulation.run(until=0.05, save_every=0.05, path=False)
+    head = trajectory.scene.head
+    drag = head.C_t * 6.0 * np.pi * head.radius * trajectory.velocities[-1, head.node]
+    assert trajectory.thrust()[-1] == pytest.approx(-drag, abs=1e-3 * np.linalg.norm(drag))
+
+
+def test_gravity_in_a_fluid_of_unknown_density_is_refused():
+    with pytest.raises(flagrs.SceneError, match=r"fluid\.density: None.*1000 for water, 0 to leave"):
+        flagrs.Scene(rods=straight(), fluid=flagrs.Fluid(viscosity=1.0), gravity=(0.0, 0.0, -9.81))
+    for density in (0.0, 1000.0):
+        fluid = flagrs.Fluid(viscosity=1.0, density=density)
+        flagrs.Scene(rods=straight(), fluid=fluid, gravity=(0.0, 0.0, -9.81))
+
+
+def test_held_filaments_have_no_swimming_speed():
+    simulation = flagrs.Simulation(flagrs.scenarios.clamped_flagella(count=1))
+    trajectory = simulation.run(until=0.05, save_every=0.01, path=False)
+    with pytest.raises(flagrs.FlagrsError, match="no swimming speed: clamps hold"):
+        trajectory.swimming_speed()
+
+
+def test_plan_tells_the_scales_and_asks_about_units():
+    plan = flagrs.scenarios.robot().plan()
+    assert plan.scales.extent == pytest.approx(0.105, rel=0.05)
+    assert 0.0 < plan.scales.reynolds < 1.0 and plan.scales.sperm_number > 0.5
+    assert not any("?" in warning for warning in plan.warnings) and "sperm number" in str(plan)
+    fluid = flagrs.Fluid(viscosity=1000.0, density=0.0)
+    rod = flagrs.Rod.straight(length=6.0, edge_count=4, radius=1.0, material=SOFT)
+    text = str(flagrs.Scene(rods=rod, fluid=fluid, gravity=(0.0, 0.0, -9810.0)).plan())
+    for question in ("millimetres?", "mPa s?", "mm/s^2?", "another unit?"):
+        assert question in text
