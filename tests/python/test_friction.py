@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_cases import SILICONE, Watch, held, incline, incline_theory, pairs_apart, pressed, radii
+from contact_cases import SILICONE, Watch, held, pairs_apart, pressed, radii
 from flagrs import Clamp, Contact, Fluid, Material, PointLoad, Rod, Scene, Simulation
 from flagrs.contact import segment_distance
 from flagrs.contact_scales import SLIP_SHARE, contact_scales, pair_stiffness
 from flagrs.time_step import size
+from flagrs.validation.problems.friction import incline, incline_theory
 
 FRICTION, STEEP = 0.3, 1.5
 
