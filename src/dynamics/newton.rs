@@ -254,7 +254,7 @@ impl Correction {
         self.length <= tolerance && self.slip.relative <= SLIP_SHARE
     }
 
-    /// One measure of both, m, linear in the correction: what the line search reduces.
+    /// One measure of both, linear in the correction: what the line search reduces.
     fn size(&self, tolerance: f64) -> f64 {
         self.length.max(tolerance * self.slip.over_smoothing / SLIP_SHARE)
     }

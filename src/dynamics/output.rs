@@ -27,7 +27,7 @@ impl Simulation {
         else {
             return Ok(between);
         };
-        let mut start = self.state_at(first)?;
+        let mut start = self.interpolated(first)?;
         let replaced = start.history.past.remove(0);
         (start.velocity, start.density) = (replaced.velocity, replaced.density);
         let (now, statistics) = (self.state.clone(), self.statistics);

@@ -442,7 +442,7 @@ impl StateInput<'_> {
         let wanted = [
             ("time", self.time.shape(), vec![1]),
             ("steps", self.steps.shape(), vec![1]),
-            ("control_step", self.control_step.shape(), vec![1]),
+            ("control_step", self.control_step.shape(), vec![if self.control_step.len() == 1 { 1 } else { 3 }]),
             ("control_order", self.control_order.shape(), vec![1]),
             ("history_order", self.history_order.shape(), vec![1]),
             ("history_states", self.history_states.shape(), vec![past, dofs]),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_cases import SILICONE, Watch, held, pairs_apart, pressed, radii
+from contact_cases import Watch, pairs_apart, pressed, radii
 from flagrs import Clamp, Contact, Fluid, Material, PointLoad, Rod, Scene, Simulation
 from flagrs.contact import segment_distance
 from flagrs.contact_scales import SLIP_SHARE, contact_scales, pair_stiffness
 from flagrs.time_step import size
 from flagrs.validation.problems.friction import incline, incline_theory
+from flagrs.validation.touching import SILICONE, held
 
 FRICTION, STEEP = 0.3, 1.5
 
@@ -54,7 +55,7 @@ def rod_on_rails(friction: float, angle: float, **contact: float) -> Scene:
     gravity = 9.81 * np.array([np.sin(angle), 0.0, -np.cos(angle)])
     return Scene(
         rods=(rod, *rails),
-        fluid=Fluid(viscosity=1.0, model="RFT"),
+        fluid=Fluid(viscosity=1.0, model="RFT", density=0.0),
         clamps=(held(1, 10), held(2, 10)),
         gravity=gravity,
         contact=Contact(friction=friction, **contact),
