@@ -1,8 +1,15 @@
 """Soft helical filaments swimming at low Reynolds number: discrete elastic rods in Stokes flow."""
 
 from flagrs import contact, fluid, scenarios
-from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError, StabilityWarning
-from flagrs.guards import EnergyWarning, FlagrsWarning, MeshWarning, ReynoldsWarning, StrainWarning
+from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError
+from flagrs.guards import (
+    EnergyWarning,
+    FlagrsWarning,
+    MeshWarning,
+    ReynoldsWarning,
+    StabilityWarning,
+    StrainWarning,
+)
 from flagrs.scene import (
     Clamp,
     Contact,

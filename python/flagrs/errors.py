@@ -14,10 +14,6 @@ class FlagrsError(Exception):
     """Base class of every error flagrs raises on purpose."""
 
 
-class StabilityWarning(UserWarning):
-    """Steps of the explicit scheme that are longer than it is known to be stable with."""
-
-
 class SceneError(FlagrsError, ValueError):
     """A scene, or a part of one, that cannot be simulated.
 

@@ -29,6 +29,10 @@ class StrainWarning(FlagrsWarning):
     """Edges stretched beyond what linear elasticity describes."""
 
 
+class StabilityWarning(FlagrsWarning):
+    """Steps of the explicit scheme that are longer than it is known to be stable with."""
+
+
 class ReynoldsWarning(FlagrsWarning):
     """Motion too fast for a fluid without inertia."""
 

@@ -17,12 +17,12 @@ from flagrs import _flagrs
 from flagrs.assemble import edges_of, native_scene
 from flagrs.budget import statistics_of
 from flagrs.default_step import default_step
-from flagrs.errors import FileError, FlagrsError, SceneError, StabilityWarning, not_allowed
+from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.frame_times import check_frames, frame_times
-from flagrs.guards import Guards, Notice
+from flagrs.guards import Guards, Notice, StabilityWarning
 from flagrs.memory import require_memory
 from flagrs.progress import bar_for
 from flagrs.recorder import Recorder, load_checkpoint
@@ -117,7 +117,7 @@ class Simulation:
         native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
         self._exclusive = Exclusive(native, "the simulation")
         self._native = cast(_flagrs.Simulation, self._exclusive)
-        self._settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
+        self._settings: dict[str, Any] = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
         self._guards = Guards(scene)
         self._restored: Path | None = None
         if rtol is not None:
@@ -509,7 +509,7 @@ class Simulation:
     def __copy__(self) -> Self:
         """Return a simulation of its own at the same state, which goes on to the same bits."""
         with self._exclusive.held():
-            options: dict[str, Any] = dict(self._settings)
+            options = self._settings
             twin = type(self)(self._scene, **options)
             twin.dt = self.dt
             twin.load_state(self.state())

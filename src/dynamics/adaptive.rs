@@ -173,6 +173,8 @@ impl Simulation {
                     // Masses do not jump.
                     self.state.velocity.clone_from(&before.velocity);
                 }
+                // Nor is a jump over that time a velocity.
+                self.state.account.extremes = before.account.extremes;
                 self.state.history = History::default();
             }
             Err(TryError::Interrupted) => return Err(StepError::Interrupted),

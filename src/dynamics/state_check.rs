@@ -31,7 +31,7 @@ impl State {
         let order = self.control.order;
         range("state.control_order", order as f64, (1..=HIGHEST_ORDER).contains(&order), "1, 2 or 3")?;
         let ceiling = self.control.ceiling;
-        range("state.control_ceiling", ceiling, ceiling > 0.0, "> 0 s")?;
+        range("state.control_step", ceiling, ceiling > 0.0, "> 0 s")?;
         self.check_history(dofs, flow)?;
         self.check_frames(like)?;
         self.check_contacts(model)

@@ -439,12 +439,10 @@ impl StateInput<'_> {
         let past = self.history_times.as_array().len();
         let flow = self.density.as_array().len();
         let forces = self.contact_forces.as_array().len();
-        // Files of before there was a ceiling have the step alone.
-        let control = if self.control_step.as_array().len() == 3 { 3 } else { 1 };
         let wanted = [
             ("time", self.time.shape(), vec![1]),
             ("steps", self.steps.shape(), vec![1]),
-            ("control_step", self.control_step.shape(), vec![control]),
+            ("control_step", self.control_step.shape(), vec![if self.control_step.len() == 1 { 1 } else { 3 }]),
             ("control_order", self.control_order.shape(), vec![1]),
             ("history_order", self.history_order.shape(), vec![1]),
             ("history_states", self.history_states.shape(), vec![past, dofs]),

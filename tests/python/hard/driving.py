@@ -6,15 +6,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from elastica import tip_deflection
 from flagrs import Clamp, Fluid, Motor, Rod, Scene, Simulation, Table, scenarios
+from flagrs.validation.elastica import tip_deflection
 
 from hard.case import add, hard
 from hard.parts import LOCAL, SILICONE, apart, bow, straight
 
 GROUP = "Driving"
-
-FUNCTIONS = "signals given as functions are seen at three instants of a step"
 
 
 def shaft(**drive: Any) -> Scene:
@@ -102,7 +100,6 @@ for words, signal in (("stepped and reversed", STEPPED), ("pulsed for 10 ms", PU
                 against="the integral of its speed [rad]",
                 # A table is integrated exactly; some twist of the last steps may be left in the shaft.
                 tolerance=(10.0 if as_function else 1e-3) * options.get("rtol", 0.0) + 1e-7,
-                awaited=FUNCTIONS if as_function and signal is not WAVE else None,
             )
 
 

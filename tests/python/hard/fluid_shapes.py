@@ -78,7 +78,7 @@ def fall(
     """Return the velocities (N, 3) with which rods begin to fall [m/s], in the third step."""
     scene = Scene(
         rods=[Rod(nodes=nodes, radius=2e-4, material=material) for nodes in rods],
-        fluid=Fluid(viscosity=1.0, epsilon=epsilon, twist_drag=False),
+        fluid=Fluid(viscosity=1.0, epsilon=epsilon, twist_drag=False, density=0.0),
         gravity=WEIGHT,
     )
     simulation = Simulation(scene, dt=step, threads=1)

@@ -13,8 +13,6 @@ from hard.parts import LOCAL, SILICONE, apart, elapsed, settle, straight
 
 GROUP = "Shapes"
 
-KINK = "frames transported over a sharp kink start twisted by pi"
-
 
 def kinked(degrees: float, turn: float = 0.0, tail: bool = False) -> Rod:
     """Return two edges of 10 mm with an angle between them, straight at rest, in a plane turned [rad].
@@ -53,7 +51,6 @@ for degrees in (90.0, 170.0, 179.0, 179.5, 179.9):
             partial(kink_energy, degrees, turn),
             against="closed form of the hinge's energy; no twist",
             tolerance=1e-7,
-            awaited=KINK if degrees > 179.2 else None,
         )
 
 
@@ -125,7 +122,9 @@ def star(arms: int, edges_per_arm: int = 4) -> Rod:
 def star_falls(arms: int, model: str, options: dict[str, float]) -> float:
     """Return how far the arms of a falling star are from turned copies of one, over an arm's length."""
     scene = Scene(
-        rods=star(arms), fluid=Fluid(viscosity=0.1, model=model), gravity=np.array([0.0, 0.0, -9.81])
+        rods=star(arms),
+        fluid=Fluid(viscosity=0.1, model=model, density=0.0),
+        gravity=np.array([0.0, 0.0, -9.81]),
     )
     nodes = elapsed(Simulation(scene, threads=1, **options), 2.0)
     assert nodes[0, 2] < -2e-4
@@ -153,7 +152,6 @@ for arms in (3, 5, 8, 16):
     "a tree with rings in it moves like the same tree numbered backwards",
     against="invariance to the order of nodes and edges",
     tolerance=1e-7,
-    awaited="the twist between frames of a network, which depends on numbers, softens bending",
 )
 def tree_renumbered() -> float:
     """Return the difference of the motions of a network and of the same one with all numbers reversed.
@@ -171,7 +169,7 @@ def tree_renumbered() -> float:
         order = np.arange(len(nodes))[::-1] if backwards else np.arange(len(nodes))
         turned = (last - edges)[::-1, ::-1] if backwards else edges
         rod = Rod(nodes=2e-3 * nodes[order], edges=turned, radius=2e-4, material=SILICONE)
-        scene = Scene(rods=rod, fluid=Fluid(viscosity=1.0), gravity=np.array([0.0, 0.0, -9.81]))
+        scene = Scene(rods=rod, fluid=Fluid(viscosity=1.0, density=0.0), gravity=np.array([0.0, 0.0, -9.81]))
         return elapsed(Simulation(scene, dt=1e-2, threads=1), 0.5)[order]
 
     return apart(motion(True), motion(False), 0.01)
