@@ -7,8 +7,9 @@ use flagrs::Vec3;
 use flagrs::fluid::head::Head;
 use flagrs::linear::pattern::Pattern;
 use flagrs::rod::assembly::{Assembly, Increment, Term};
-use flagrs::rod::configuration::{Configuration, ReferenceFrames, node};
+use flagrs::rod::configuration::{Configuration, node};
 use flagrs::rod::network::Network;
+use flagrs::rod::reference::ReferenceFrames;
 
 const TRANSLATION: f64 = 1.7;
 const ROTATION: f64 = 0.6;
