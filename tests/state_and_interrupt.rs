@@ -11,6 +11,9 @@ use flagrs::dynamics::scheme::Scheme;
 use flagrs::dynamics::simulation::Simulation;
 use flagrs::dynamics::state::State;
 
+/// Makes a field wrong.
+type Spoil = fn(&mut State);
+
 fn robot() -> Simulation {
     let dt = scenes::robot_step(20.0);
     Simulation::new(scenes::robot(7.0, 20.0), Scheme::Overdamped, dt, 1).expect("a valid scene")
@@ -18,7 +21,7 @@ fn robot() -> Simulation {
 
 #[test]
 fn a_state_with_a_wrong_field_is_refused_by_name_and_the_present_one_kept() {
-    let wrongs: [(&str, fn(&mut State)); 9] = [
+    let wrongs: [(&str, Spoil); 9] = [
         ("state.time", |state| state.time = f64::NAN),
         ("state.q", |state| state.q.push(0.0)),
         ("state.q", |state| state.q[4] = f64::INFINITY),
