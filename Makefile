@@ -14,12 +14,13 @@ SOURCES := Cargo.toml Cargo.lock pyproject.toml $(shell find src -name '*.rs')
 # Examples of `make fuzz`.
 EXAMPLES ?= 10000
 
-.PHONY: help demo fuzz coverage coverage-rust test test-rust test-rust-doc test-python test-python-doc test-wheel figure wheel studies validation bench clean
+.PHONY: help demo fuzz coverage coverage-rust test test-rust test-rust-doc test-python test-python-doc test-slow test-wheel figure wheel studies validation bench clean
 .PHONY: lint lint-rust lint-python fmt clippy rustdoc ruff ruff-format mypy stubtest
 
 help:
 	@echo 'make demo        build, run the robot for 100 s of its time, leave robot.h5 and robot.png'
-	@echo 'make test        build, run all tests: Rust, Python, and the examples of the documents'
+	@echo 'make test        build, run the tests: Rust, Python, and the examples of the documents'
+	@echo 'make test-slow   those Python tests that take more than half a minute each'
 	@echo 'make lint        formatting, lints and types of both languages'
 	@echo 'make fuzz        random scenes that no test has seen; EXAMPLES=100000 for as many, an hour or more'
 	@echo 'make coverage    lines of the Python package that its tests run; make coverage-rust those of the core'
@@ -63,7 +64,10 @@ test-rust-doc:
 	cargo test --locked --doc
 
 test-python: $(VENV)/equipped
-	$(BIN)/python -m pytest tests/python
+	$(BIN)/python -m pytest -m 'not slow' tests/python
+
+test-slow: $(VENV)/equipped
+	$(BIN)/python -m pytest -m slow tests/python
 
 # New scenes every time, against the properties of tests/python/test_fuzz.py; a failing one is printed as TOML.
 fuzz: $(VENV)/equipped
@@ -71,7 +75,7 @@ fuzz: $(VENV)/equipped
 
 # Lines of the package and of the core that their tests run; CONTRIBUTING says what the second needs.
 coverage: $(VENV)/equipped
-	$(BIN)/python -m coverage run --source=python/flagrs -m pytest tests/python
+	$(BIN)/python -m coverage run --source=python/flagrs -m pytest -m 'not slow' tests/python
 	$(BIN)/python -m coverage report --skip-covered
 
 coverage-rust:

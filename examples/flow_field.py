@@ -4,9 +4,10 @@ import flagrs
 import numpy as np
 from matplotlib import pyplot as plt
 
-scene = flagrs.scenarios.clamped_flagella(count=1, angular_velocity=15.0)
+# Slow and in a thick fluid: the published 15 rad/s in 0.1 Pa s is a Reynolds number of 25: a run warns of it.
+scene = flagrs.scenarios.clamped_flagella(count=1, angular_velocity=2.4, fluid={"viscosity": 0.6})
 simulation = flagrs.Simulation(scene)
-trajectory = simulation.run(until=0.5, save_every=0.1, path=False)
+trajectory = simulation.run(until=3.0, save_every=0.6, path=False)
 
 along = np.linspace(-0.05, 0.25, 61)
 across = np.linspace(-0.06, 0.06, 25)

@@ -1,4 +1,4 @@
-"""Bundles of clamped flagella in contact, and robots: time of long runs, gaps, contacts, iterations over time.
+"""Bundles of clamped flagella in contact, and robots: time of long runs, gaps, contacts, iterations.
 
 Run ``python benches/python/bundles.py [--document docs/performance.md]``; about ten minutes.
 """

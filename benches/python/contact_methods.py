@@ -1,4 +1,4 @@
-"""Two flagella in contact by two methods and several tolerances: speed against error, forces, gaps, iterations.
+"""Two flagella in contact by two methods and several tolerances: speed against error, forces, iterations.
 
 Run ``python benches/python/contact_methods.py [--document docs/performance.md]``.
 """

@@ -169,8 +169,9 @@ class Network:
         edges = (self.labels[self.node_dofs[self.edges]] == label).any(axis=1)
         edges |= self.labels[self.edge_dofs] == label
         hinges = edges[native["hinges"]].any(axis=1)
-        # Others are too soft to count: what a term costs is proportional to its stiffness.
-        soft = np.finfo(float).tiny ** 0.5
+        # Others are too soft to count: what a term costs is proportional to its stiffness. Determinants of
+        # bending stiffness, their squares, must not vanish.
+        soft = np.finfo(float).tiny ** 0.25
         own = {
             "stretching": native["stretching"] * np.where(edges, 1.0, soft),
             "bending": native["bending"] * np.where(hinges, 1.0, soft)[:, None, None],

@@ -58,14 +58,14 @@ impl Pair {
         let (mut moments, mut total) = ([Gradient12::zeros(); 2], Gradient12::zeros());
         let sums = self.sums(x, |feature, pressure, turned| {
             let separation = &feature.separation;
-            let mut change = turned.clone();
+            let mut change = *turned;
             let weight = feature.weight * feature.contribution.barrier.curvature;
             separation.add_gradient(-weight, &mut change);
             let moved = separation.variation(x);
             force += separation.normal * change.transpose() + moved.normal * pressure;
             total += &change;
             for side in 0..2 {
-                moments[side] += &change * separation.places[side] + moved.places[side] * pressure;
+                moments[side] += change * separation.places[side] + moved.places[side] * pressure;
             }
         })?;
         let push = sums.push()?;

@@ -11,7 +11,7 @@ pub type Hook = Box<dyn FnMut() -> bool + Send + Sync>;
 /// Whether the step at hand is to be given up.
 ///
 /// Once the hook has said so every further question is answered alike, so that all loops of a step end one after another;
-/// [`Self::begin`] starts anew.
+/// the next step starts anew.
 #[derive(Default)]
 pub struct Interrupt {
     hook: Option<Hook>,

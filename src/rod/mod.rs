@@ -4,7 +4,7 @@
 //! * [`fault`]: why positions are not a configuration, and where.
 //! * [`frames`]: parallel transport in space and time, reference twist, holonomy.
 //! * [`strain`]: curvature and twist of one hinge with exact first and second derivatives.
-//! * [`reference`]: frames that trial states are transported from.
+//! * [`mod@reference`]: frames that trial states are transported from.
 //! * [`configuration`]: everything about a trial state that several terms need, computed once.
 //! * [`assembly`]: how a term hands its gradient and Hessian blocks to the solver.
 

@@ -35,22 +35,21 @@ def imbalance(simulation: Simulation) -> tuple[float, float]:
     nodes, edges, velocities = simulation.nodes, simulation.edges, simulation.velocities
     forces = (resistance @ velocities.ravel()).reshape(-1, 3)
     forces[head.node] += head.C_t * 6.0 * np.pi * fluid.viscosity * head.radius * velocities[head.node]
-    before, after = head.node - 1, head.node + 1
-    span = nodes[after] - nodes[before]
-    strength = head.C_r * 8.0 * np.pi * fluid.viscosity * head.radius**3 / (span @ span)
-    couple = strength * (velocities[after] - velocities[before])
-    forces[after] += couple
-    forces[before] -= couple
     tangents = nodes[edges[:, 1]] - nodes[edges[:, 0]]
     tangents /= np.linalg.norm(tangents, axis=1)[:, None]
     drag = 4.0 * np.pi * fluid.viscosity * rod.radius_array() ** 2 * rod.rest_lengths() * rod.immersed_array()
     spin = (simulation.theta - theta) / simulation.dt
     twists = (drag * spin * fluid.twist_drag)[:, None] * tangents
-    torques = np.cross(nodes, forces)
-    return (
-        _share(forces.sum(axis=0), forces),
-        _share(torques.sum(axis=0) + twists.sum(axis=0), np.concatenate([torques, twists])),
-    )
+    # The head turns as its edges do on average by rest length: across their tangents with their ends, about
+    # them with their angle.
+    held = np.flatnonzero((edges == head.node).any(axis=1))
+    levers = nodes[edges[held, 1]] - nodes[edges[held, 0]]
+    opening = velocities[edges[held, 1]] - velocities[edges[held, 0]]
+    turning = np.cross(levers, opening) / (levers**2).sum(axis=1)[:, None] + spin[held, None] * tangents[held]
+    turn = np.average(turning, axis=0, weights=rod.rest_lengths()[held])
+    couple = head.C_r * 8.0 * np.pi * fluid.viscosity * head.radius**3 * turn
+    torques = np.concatenate([np.cross(nodes, forces), twists, couple[None]])
+    return _share(forces.sum(axis=0), forces), _share(torques.sum(axis=0), torques)
 
 
 def _share(total: np.ndarray, parts: np.ndarray) -> float:

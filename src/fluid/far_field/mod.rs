@@ -19,6 +19,7 @@
 
 mod accuracy;
 mod close;
+mod error;
 mod field;
 mod harmonics;
 mod interactions;
@@ -38,6 +39,8 @@ use rayon::prelude::*;
 
 use self::accuracy::{Accuracy, gauss_rule};
 use self::close::{BYTES_PER_PAIR, Entry, Neighbourhood, Scratch};
+pub use self::error::{FarFieldError, LARGEST_TOLERANCE, SMALLEST_TOLERANCE};
+use self::error::{check_length, check_positions};
 use self::harmonics::Harmonics;
 use self::interactions::Interactions;
 use self::octet::Four;
@@ -46,59 +49,6 @@ use self::translation::Translation;
 use self::tree::Tree;
 use crate::Vec3;
 use crate::fluid::lanes::Path;
-
-/// Why there is no product.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FarFieldError {
-    /// The tolerance is out of range.
-    #[error("tolerance is {0:e}; it must lie between {SMALLEST_TOLERANCE:e} and {LARGEST_TOLERANCE:e}")]
-    Tolerance(f64),
-    /// A node or target is not finite.
-    #[error("{field} {index} is {value:?}; its coordinates must be finite")]
-    Position {
-        /// "node" or "target".
-        field: &'static str,
-        /// Its number.
-        index: usize,
-        /// Its position, m.
-        value: [f64; 3],
-    },
-    /// An edge has no length, joins a node to itself, or names a node that does not exist.
-    #[error("edge {edge} joins nodes {ends:?}; they must be two of the {nodes} nodes, at different positions")]
-    Edge {
-        /// Its number.
-        edge: usize,
-        /// The nodes it names.
-        ends: [usize; 2],
-        /// How many nodes there are.
-        nodes: usize,
-    },
-    /// A regularization length is not positive, or too small beside the scene.
-    #[error("epsilon {edge} is {value:e} m; it must be finite and above {smallest:e} m in a scene of this size")]
-    Epsilon {
-        /// The number of its edge.
-        edge: usize,
-        /// Its value, m.
-        value: f64,
-        /// The smallest value allowed, m.
-        smallest: f64,
-    },
-    /// An argument has the wrong length.
-    #[error("{field} has {actual} entries; it must have {expected}")]
-    Length {
-        /// The argument.
-        field: &'static str,
-        /// How many entries it has.
-        actual: usize,
-        /// How many it must have.
-        expected: usize,
-    },
-}
-
-/// Smallest relative error that can be asked for.
-pub const SMALLEST_TOLERANCE: f64 = 1e-9;
-/// Largest relative error that can be asked for.
-pub const LARGEST_TOLERANCE: f64 = 1e-1;
 
 /// Smallest regularization over the extent of the scene: beyond, squared lengths leave the range of single precision, in
 /// which inverse distances start.
@@ -478,17 +428,6 @@ fn for_each<T: Send>(pool: Option<&ThreadPool>, items: &mut [T], work: impl Fn(&
             let mut scratch = Scratch::default();
             items.iter_mut().for_each(|item| work(&mut scratch, item));
         }
-    }
-}
-
-fn check_length(field: &'static str, actual: usize, expected: usize) -> Result<(), FarFieldError> {
-    if actual == expected { Ok(()) } else { Err(FarFieldError::Length { field, actual, expected }) }
-}
-
-fn check_positions(field: &'static str, positions: &[Vec3]) -> Result<(), FarFieldError> {
-    match positions.iter().position(|position| !position.iter().all(|c| c.is_finite())) {
-        None => Ok(()),
-        Some(index) => Err(FarFieldError::Position { field, index, value: positions[index].into() }),
     }
 }
 

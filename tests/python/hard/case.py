@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from flagrs import FlagrsError
-from flagrs.errors import StabilityWarning
+from flagrs import FlagrsError, StabilityWarning
 from flagrs.guards import FlagrsWarning
 
 #: All cases by name, in the order in which they were defined.

@@ -16,7 +16,7 @@ GROUP = "Stiffnesses"
 #: Where a second rod is put, too far away to matter [m].
 FAR = (0.0, 50.0, 0.0)
 
-FLOOR = "one scale of force for the whole scene decides what is round-off, and stops the soft motion"
+STIFF_TWIST = "round-off of a stiff twist, as it is estimated, stops a soft bend 0.7 % before its end"
 
 
 def stretching_over_bending(compliance: float) -> np.ndarray:
@@ -38,7 +38,7 @@ for compliance in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
         partial(stretching_over_bending, compliance),
         against="extensible elastica, by shooting",
         tolerance=4e-4,
-        awaited=FLOOR if compliance == 1e-10 else None,
+        may_refuse=compliance == 1e-10,
     )
 
 
@@ -67,6 +67,7 @@ for ratio in (1e-4, 1e-2, 1.0, 1e2, 1e4):
         partial(bending_over_twisting, ratio),
         against="Castigliano's theorem for a quarter circle",
         tolerance=2e-3,
+        awaited=STIFF_TWIST if ratio == 1e-4 else None,
     )
 
 STEEL = Material(youngs_modulus=2e11, density=7800.0)
