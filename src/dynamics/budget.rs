@@ -135,6 +135,8 @@ pub(super) struct Accepted<'a> {
     pub motor_angles: &'a [f64],
     pub dt: f64,
     pub order: usize,
+    /// Length of a step, s, from which on its velocities are those of a motion and not of an instant.
+    pub shortest_lasting: f64,
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -164,7 +166,7 @@ impl Balance {
         account.stored = self.stored(model, accepted.q, velocity, step.scheme.has_inertia());
         account.most_stored = account.most_stored.max(account.stored.iter().sum::<f64>().abs());
         self.check_balance(model, accepted.q, &mut account);
-        self.meet_extremes(model, velocity, &mut account);
+        self.meet_extremes(accepted, &mut account);
         account
     }
 
@@ -329,7 +331,8 @@ impl Balance {
         }
     }
 
-    fn meet_extremes(&self, model: &Model, velocity: &[f64], account: &mut Account) {
+    fn meet_extremes(&self, accepted: &Accepted, account: &mut Account) {
+        let Accepted { model, velocity, .. } = *accepted;
         let (time, configuration) = (account.time, &self.configuration);
         let largest = |values: &mut dyn Iterator<Item = f64>| {
             values.enumerate().fold((0.0, 0), |most, (k, value)| if value > most.0 { (value, k) } else { most })
@@ -337,7 +340,9 @@ impl Balance {
         let bend = |hinge: usize| model.hinges.bend(hinge, configuration);
         let strain = |edge: usize| model.stretching.strain(configuration, edge).abs();
         let width = |edge: usize| model.regularization[edge] / configuration.length(edge);
-        let reynolds = |(&dof, scale): (&usize, &f64)| node(velocity, dof).norm() * scale;
+        // In the instant in which what is out of balance lets go, velocities say nothing of the motion that follows.
+        let lasting = accepted.dt >= accepted.shortest_lasting;
+        let reynolds = |(&dof, scale): (&usize, &f64)| if lasting { node(velocity, dof).norm() * scale } else { 0.0 };
         let nodes = model.network.node_dofs().iter().zip(&model.specification.reynolds);
         let edges = model.network.edges().len();
         let found = [

@@ -29,6 +29,9 @@ const ROUGH_TOLERANCE: f64 = 1e-4;
 /// Factors on friction's smoothing velocity where a step is not solved at once; the last is one.
 const WIDENINGS: [f64; 5] = [1024.0, 128.0, 16.0, 4.0, 1.0];
 
+/// Part of a fixed step below which one is an instant.
+const INSTANT: f64 = 1e-3;
+
 /// How often a step may be halved.
 const HALVINGS: u32 = 12;
 
@@ -445,6 +448,7 @@ impl Simulation {
             motor_angles: &step.motor_angles,
             dt,
             order,
+            shortest_lasting: INSTANT * self.dt,
         });
         let angles = step.into_drives().motor_angles;
         let state = &mut self.state;
