@@ -40,11 +40,14 @@ def test_the_tolerance_is_kept(tolerance: float) -> None:
 
 
 def test_steps_of_any_length_keep_flagella_apart() -> None:
-    # A turn of 1.5 rad a step: inaccurate, and safe.
-    simulation = flagrs.Simulation(flagrs.scenarios.clamped_flagella(), dt=0.1)
-    gap, contacts = smallest_gap(simulation, 5.0)
+    # A turn of 1.5 rad a step: inaccurate, and safe. From rest such steps damp the bundling itself, so that
+    # nothing meets; they begin where short ones have led to.
+    simulation = flagrs.Simulation(flagrs.scenarios.clamped_flagella(), dt=0.02)
+    met, _ = smallest_gap(simulation, 3.3)
+    simulation.dt = 0.1
+    gap, contacts = smallest_gap(simulation, 6.0)
     assert contacts > 0
-    assert gap > -0.05
+    assert min(met, gap) > -0.05
 
 
 def test_the_robot_whose_flagella_touch_swims_on() -> None:
