@@ -325,6 +325,17 @@ impl BarrierLaw {
         largest
     }
 
+    /// By how much friction that turns round would change a sliding velocity, over the smoothing velocity, at most; `mobility` is how fast
+    /// every node moves under a force, m/(N s).
+    pub fn friction_reach(&self, state: &BarrierState, mobility: &[f64]) -> f64 {
+        let reach = |(element, contact): &(usize, SlidingContact)| {
+            let friction = self.friction_of(state, *element)?;
+            let moves = contact.weights.iter().zip(contact.nodes).map(|(w, node)| w * w * mobility[node]).sum::<f64>();
+            Some(2.0 * friction.coefficient * contact.force * moves / friction.smoothing_velocity)
+        };
+        state.sliding.iter().filter_map(reach).fold(0.0, f64::max)
+    }
+
     /// Whether friction acts anywhere: its exact derivative is not symmetric.
     pub fn slides(&self, state: &BarrierState) -> bool {
         !state.sliding.is_empty()

@@ -312,7 +312,20 @@ impl Balance {
         self.barrier.as_mut().is_some_and(BarrierTerm::define)
     }
 
-    /// Multiplies the smoothing velocity of friction by a factor.
+    /// How far friction can change sliding velocities within the step, over its smoothing velocity; contacts are those at the
+    /// configuration of the last residual.
+    pub fn friction_reach(&self, model: &Model, step: &Step) -> f64 {
+        let Some((law, barrier)) = model.barrier().zip(self.barrier.as_ref()) else { return 0.0 };
+        let dofs = model.network.node_dofs();
+        let mut mobility = Vec::new();
+        self.node_stiffness(model, step, &mut mobility);
+        for (stiffness, &dof) in mobility.iter_mut().zip(dofs) {
+            *stiffness = if model.prescribed[dof] { 0.0 } else { step.rate / *stiffness };
+        }
+        barrier.friction_reach(law, &mobility)
+    }
+
+    /// Multiplies the smoothing velocity of friction by a factor, and takes the exact matrix of contact again.
     pub fn widen_friction(&mut self, factor: f64) {
         if let Some(barrier) = &mut self.barrier {
             barrier.widen_friction(factor);

@@ -55,8 +55,9 @@ impl BarrierTerm {
         self.place(law, node_dofs, q);
     }
 
-    /// Multiplies the smoothing velocity of friction by a factor.
+    /// Multiplies the smoothing velocity of friction by a factor, for a solve with the exact matrix.
     pub fn widen_friction(&mut self, factor: f64) {
+        self.curvature = Curvature::Exact;
         self.state.widen_friction(factor);
     }
 
@@ -156,6 +157,11 @@ impl BarrierTerm {
         self.change.clear();
         self.change.extend(node_dofs.iter().map(|&dof| node(moved, dof) * rate));
         law.slip_change(&self.state, &self.velocities, &self.change, yielding, tolerance)
+    }
+
+    /// See [`BarrierLaw::friction_reach`].
+    pub fn friction_reach(&self, law: &BarrierLaw, mobility: &[f64]) -> f64 {
+        law.friction_reach(&self.state, mobility)
     }
 
     /// Whether friction acts at the configuration of the last residual.

@@ -28,6 +28,7 @@ mod between;
 mod breaks;
 pub mod budget;
 pub mod contact_model;
+mod continuation;
 pub mod control;
 pub mod diagnostics;
 pub mod failure;

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::balance::{Balance, Drives, Step, Unknowns};
 use super::budget::Accepted;
 use super::contact_model::ContactModel;
+use super::continuation::Continuation;
 use super::control::{Control, Estimate};
 use super::failure::{StepError, TryError};
 use super::inputs::Inputs;
@@ -25,9 +26,6 @@ use crate::forces::outside::{ForceFunction, OutsideForce};
 
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
-
-/// Factors on friction's smoothing velocity where a step is not solved at once; the last is one.
-const WIDENINGS: [f64; 5] = [1024.0, 128.0, 16.0, 4.0, 1.0];
 
 /// Part of a fixed step below which one is an instant.
 const INSTANT: f64 = 1e-3;
@@ -372,22 +370,8 @@ impl Simulation {
         let law = model.contact.as_ref().and_then(ContactModel::spillmann);
         let (Some(law), Some(contact)) = (law, contact) else {
             keep_apart(balance, model, &state.q, &mut trial.q, statistics)?;
-            let guess = model.barrier().filter(|law| law.has_friction()).map(|_| trial.clone());
-            let mut solved = newton::solve(balance, model, &step, settings, work, trial, statistics);
-            if let (Some(guess), Err(_)) = (guess, &solved) {
-                // From sticking to sliding the force of friction turns over within so small a velocity that Newton's method
-                // may not see it coming: it is led there over wider ones.
-                *trial = guess;
-                for factor in WIDENINGS {
-                    balance.widen_friction(factor);
-                    solved = newton::solve(balance, model, &step, settings, work, trial, statistics);
-                    if solved.is_err() {
-                        break;
-                    }
-                }
-                balance.widen_friction(1.0);
-            }
-            solved.map_err(failed)?;
+            let mut continuation = Continuation { balance, model, step: &step, settings, work, statistics };
+            continuation.solve(trial).map_err(failed)?;
             return Ok(step.into_drives());
         };
         contact.begin(&state.contacts);

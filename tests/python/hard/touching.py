@@ -47,7 +47,6 @@ for friction in (0.0, 0.3, 1.0, 2.0):
                 partial(incline_error, angle, friction, options),
                 against="balance of weight, Coulomb's friction and drag",
                 tolerance=1e-2,
-                may_refuse="rtol" in options,
             )
 
 
