@@ -37,7 +37,7 @@ CHUNK_BYTES = 64 * 1024
 
 #: Longest look at a file that nothing vouches for [s], besides 1 s for every 10 MB: it is limited by its own
 #: processor time, this is for a machine that has none to give.
-LOOK_SECONDS = 60.0
+LOOK_SECONDS = 20.0
 
 State = dict[str, npt.NDArray[Any]]
 
