@@ -145,3 +145,31 @@ fn the_matrix_of_friction_is_the_derivative_of_its_forces_in_a_step() {
         assert!((0..144).any(|k| (definite[k] - matrix[k]).abs() > 1e-3 * size));
     }
 }
+
+#[test]
+fn the_reach_of_friction_is_the_velocity_that_it_can_turn_round_over_the_smoothing_one() {
+    let mut random = Random::new(11);
+    let bodies = Bodies::new(4, &[[0, 1], [2, 3]], &[0.2, 0.2], &[1.0, 1.1], &[true, true], &[], 0.0);
+    let friction = Friction { coefficient: 0.4, smoothing_velocity: 0.3 };
+    let law = BarrierLaw::new(bodies, DELTA, 7.0).with_friction(friction).with_slip_velocities(vec![0.1, 0.3]);
+    let mobility = [0.5, 2.0, 0.0, 3.0];
+    for round in 0..20 {
+        let x = edges(&mut random, 0.7, false);
+        let mut state = law.state();
+        law.ensure(&mut state, &x);
+        law.find_sliding(&mut state, &x);
+        // The forces of full sliding, moving the nodes by their mobilities, change the sliding velocity by half the reach.
+        let [contact] = law.forces(&state, &x)[..] else { panic!("one pair touches") };
+        let fast = contact.contact.normal.cross(&Vec3::x()).normalize() * 5.0;
+        let velocities: Vec<Vec3> = (0..4).map(|i| if i < 2 { fast } else { Vec3::zeros() }).collect();
+        let mut moved = [Vec3::zeros(); 4];
+        law.add_friction(&state, &x, &velocities, None, |_, gradient, _| {
+            (0..4).for_each(|i| moved[i] = Vec3::from_column_slice(&gradient[3 * i..3 * i + 3]) * mobility[i]);
+        });
+        let expected = 2.0 * contact.contact.sliding(&moved).norm() / 0.3;
+        let reach = law.friction_reach(&state, &mobility);
+        assert!((reach - expected).abs() < 1e-12 * expected && reach > 0.0, "{round}: {reach} {expected}");
+        state.widen_friction(8.0);
+        assert!((law.friction_reach(&state, &mobility) - expected / 8.0).abs() < 1e-12 * expected);
+    }
+}

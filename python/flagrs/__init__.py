@@ -3,6 +3,7 @@
 from flagrs import contact, fluid, scenarios
 from flagrs.errors import ConvergenceError, FileError, FlagrsError, SceneError
 from flagrs.guards import (
+    ContactWarning,
     EnergyWarning,
     FlagrsWarning,
     MeshWarning,
@@ -40,6 +41,7 @@ __version__ = installed_version()
 __all__ = [
     "Clamp",
     "Contact",
+    "ContactWarning",
     "ConvergenceError",
     "EnergyWarning",
     "FileError",

@@ -79,6 +79,22 @@ def pair_stiffness(scales: ContactScales, pair: tuple[int, int], thickness: floa
     return force / (MIDDLE_SLOPE * 2.0 * tolerance * thickness)
 
 
+def suitable_stiffness(scene: Scene) -> tuple[float, float]:
+    """Return the least and the largest stiffness [Pa] that any pair of rods in contact would be given."""
+    contact = scene.contact
+    assert contact is not None
+    scales = contact_scales(scene)
+    # A pair bears no less than the weaker of its rods bears against its like, and no more than the stronger.
+    forces = np.where(np.isfinite(scales.bent), np.maximum(scales.driven, scales.bent), scales.driven)
+    forces = forces[forces > 0.0]
+    radii = [radius for rod in scene.rods for radius in (rod.radius_array().min(), rod.radius_array().max())]
+    thick = max(float(max(radii)), contact.head_radius or 0.0)
+    over = MIDDLE_SLOPE * 4.0 * contact.tolerance_or_default()
+    if len(forces) == 0:
+        return 0.0, math.inf
+    return float(forces.min()) / (over * thick), float(forces.max()) / (over * float(min(radii)))
+
+
 class _RodScales:
     """The sizes of one rod, and what drives it."""
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagrs.budget import budget_of
+from flagrs.contact_scales import suitable_stiffness
 from flagrs.scene import Scene
 from flagrs.scene.values import FloatArray
 
@@ -33,6 +34,10 @@ class StabilityWarning(FlagrsWarning):
     """Steps of the explicit scheme that are longer than it is known to be stable with."""
 
 
+class ContactWarning(FlagrsWarning):
+    """A stiffness of contact far from what the scene's contacts have to bear."""
+
+
 class ReynoldsWarning(FlagrsWarning):
     """Motion too fast for a fluid without inertia."""
 
@@ -46,6 +51,8 @@ MOST_BENDING = np.pi / 3.0
 MOST_STRAIN = 0.2
 #: Regularization over the length of an edge.
 MOST_REGULARIZATION = 1.0
+#: Given stiffness of contact over the suitable one, or the inverse.
+MOST_UNSUITABLE = 100.0
 #: Reynolds number.
 MOST_REYNOLDS = 1.0
 
@@ -131,6 +138,25 @@ def _notice(kind: str, extreme: FloatArray, text: str) -> Notice:
 
 def _overstated(angle: float) -> float:
     return float((2.0 * np.tan(angle / 2.0) / angle) ** 2)
+
+
+def check_contact(scene: Scene) -> None:
+    """Warn of a given stiffness of contact that is far from the suitable one: steps may become very short."""
+    contact = scene.contact
+    if contact is None or contact.stiffness is None or contact.method != "barrier":
+        return
+    least, largest = suitable_stiffness(scene)
+    given = float(contact.stiffness)
+    factor, side = max((least / given, "below"), (given / largest, "above"))
+    if factor > MOST_UNSUITABLE:
+        fits = f"{least:.1e} Pa" if largest < 1.1 * least else f"{least:.1e} to {largest:.1e} Pa"
+        warnings.warn(
+            f"contact.stiffness: {given:g} Pa is {factor:.1e} times {side} what the scene's contacts have to "
+            f"bear ({fits}): filaments rest at the end of the range of contact, and steps may become too "
+            "short for the run to end in time; None takes the stiffness from the scene",
+            ContactWarning,
+            stacklevel=4,
+        )
 
 
 class Guards:

@@ -22,7 +22,7 @@ from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.frame_times import check_frames, frame_times
-from flagrs.guards import Guards, Notice, StabilityWarning
+from flagrs.guards import Guards, Notice, StabilityWarning, check_contact
 from flagrs.memory import require_memory
 from flagrs.outside_force import ForceFunction, OutsideForce
 from flagrs.progress import bar_for
@@ -122,6 +122,7 @@ class Simulation:
             )
         step = default_step(scene) if dt is None else number("dt", dt, Bounds("s", above=0.0))
         _check_scheme(scene, scheme)
+        check_contact(scene)
         self._scene = scene
         native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
         self._exclusive = Exclusive(native, "the simulation")

@@ -5,11 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from contact_cases import Watch, pairs_apart, pressed, radii
-from flagrs import Clamp, Contact, Fluid, Material, PointLoad, Rod, Scene, Simulation
+from flagrs import (
+    Clamp,
+    Contact,
+    ContactWarning,
+    Fluid,
+    Material,
+    PointLoad,
+    Rod,
+    Scene,
+    Simulation,
+    scenarios,
+)
 from flagrs.contact import segment_distance
 from flagrs.contact_scales import SLIP_SHARE, contact_scales, pair_stiffness
 from flagrs.time_step import size
-from flagrs.validation.problems.friction import incline, incline_theory
+from flagrs.validation.problems.friction import Capstan, incline, incline_theory
 from flagrs.validation.touching import SILICONE, held
 
 FRICTION, STEEP = 0.3, 1.5
@@ -158,3 +169,43 @@ def test_scales_of_many_rods_are_found_in_linear_time() -> None:
     scales = contact_scales(scene)
     assert len(scales.driven) == 400
     assert (scales.bent == scales.bent[0]).all()
+
+
+@pytest.mark.parametrize("slip", [1e-5, 1e-6])
+@pytest.mark.parametrize(("friction", "steep"), [(0.3, 1.5), (1.0, 0.8), (2.0, 0.9), (2.0, 1.3)])
+def test_a_rod_that_leaps_off_its_rails_costs_no_more_than_a_few_hundred_iterations(
+    friction: float, steep: float, slip: float
+) -> None:
+    # Pressed with hundreds of times its weight it starts at 180 m/s: friction turns over within 1e-8 of that.
+    angle = float(np.arctan(steep * friction))
+    simulation = Simulation(incline(angle, friction, slip), rtol=1e-4, threads=1)
+    simulation.run(until=0.05, save_every=0.05, path=False)
+    statistics = simulation.statistics
+    assert statistics["steps"] < 300
+    assert statistics["newton_iterations"] < 2500
+    theory = incline_theory(simulation, angle)
+    assert simulation.velocities[:6, 0].mean() == pytest.approx(theory, rel=1e-2)
+
+
+def test_a_rope_wrapped_once_around_a_drum_holds_what_the_capstan_says() -> None:
+    # Its first step, 1 ms, starts at rest under the whole load.
+    rope = Capstan(2.0 * np.pi, 0.5)
+    assert rope.ratio() == pytest.approx(rope.theory(), rel=1e-2)
+
+
+@pytest.mark.parametrize(("stiffness", "side"), [(1.0, "below"), (1e12, "above")])
+def test_a_stiffness_far_from_the_suitable_one_is_warned_of(stiffness: float, side: str) -> None:
+    scene = scenarios.clamped_flagella(count=4, contact={"stiffness": stiffness})
+    own = pair_stiffness(contact_scales(scene), (0, 1), 2e-3, 0.05)
+    factor = max(own / stiffness, stiffness / own)
+    with pytest.warns(ContactWarning, match=f"is {factor:.1e} times {side}".replace("+", "[+]")):
+        Simulation(scene, rtol=1e-2, threads=1)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("factor", [None, 0.02, 50.0])
+def test_a_stiffness_near_the_suitable_one_is_not_warned_of(factor: float | None) -> None:
+    scene = scenarios.clamped_flagella(count=4)
+    own = pair_stiffness(contact_scales(scene), (0, 1), 2e-3, 0.05)
+    given = {} if factor is None else {"stiffness": factor * own}
+    Simulation(scenarios.clamped_flagella(count=4, contact=given), rtol=1e-2, threads=1)
