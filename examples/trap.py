@@ -2,6 +2,7 @@
 
 import flagrs
 import numpy as np
+from matplotlib import pyplot as plt
 
 SPRING = 5e-3  # N/m
 soft = flagrs.Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
@@ -21,3 +22,12 @@ simulation = flagrs.Simulation(scene, rtol=1e-3, force=trap)
 trajectory = simulation.run(until=5.0, save_every=0.5, path=False)
 behind = 2e-3 * 5.0 - (trajectory.nodes[-1, -1, 1] - rod.nodes[-1, 1])
 print(f"the end follows the trap {1e3 * behind:.2f} mm behind it, pulled by {1e6 * SPRING * behind:.2f} uN")
+
+figure, panel = plt.subplots(figsize=(7.0, 3.0), layout="constrained")
+for time, nodes in zip(trajectory.time[::2], trajectory.nodes[::2], strict=True):
+    panel.plot(1e3 * nodes[:, 0], 1e3 * nodes[:, 1], color="C0")
+    panel.plot(1e3 * rod.nodes[-1, 0], 2.0 * time, "x", color="C3")
+panel.set_xlabel("x [mm]")
+panel.set_ylabel("y [mm]")
+panel.set_title("the rod every second, and the trap (crosses)", fontsize=10)
+figure.savefig("trap.png", dpi=150)
