@@ -2,6 +2,7 @@
 //!
 //! * [`specification`]: what a scene says, as plain data.
 //! * [`model`]: the constant part of a simulation, built once from a specification.
+//! * `scene_terms`: the terms that a scene asks for.
 //! * [`state`]: the changing part, plain data that can be saved and restored to the last bit; `state_check`: of one from
 //!   elsewhere, what must hold.
 //! * [`terms`]: inertia and loads, the terms that belong to no other room.
@@ -42,6 +43,7 @@ mod outside;
 pub mod predictor;
 mod progress;
 mod round_off;
+mod scene_terms;
 pub mod scheme;
 pub mod simulation;
 mod solve;

@@ -7,9 +7,10 @@ use super::control::Control;
 use super::filaments::Filaments;
 use super::predictor::History;
 use super::round_off::RoundOff;
-use super::specification::{FlowSpecification, FluidModelSpecification, Frame, LoadKind, Specification};
+use super::scene_terms::{dissipative_terms, load_terms, masses, regularization, spin_resistances, weights};
+use super::specification::{FlowSpecification, FluidModelSpecification, Specification};
 use super::state::State;
-use super::terms::{Inertia, Loads};
+use super::terms::Inertia;
 use crate::Vec3;
 use crate::contact::potential::BarrierLaw;
 use crate::elastic::bending::Bending;
@@ -20,15 +21,11 @@ use crate::elastic::stretching::Stretching;
 use crate::elastic::twisting::Twisting;
 use crate::fluid::FluidModel;
 use crate::fluid::ambient::{Ambient, AmbientFlow};
-use crate::fluid::head::{Head, MOST_EDGES};
+use crate::fluid::head::MOST_EDGES;
 use crate::fluid::product::FarFieldChoice;
 use crate::fluid::rft::ResistiveForce;
 use crate::fluid::rss::StokesletSegments;
-use crate::fluid::twist_drag::TwistDrag;
-use crate::forces::follower::{FollowerForce, FollowerTorque};
 use crate::forces::inputs as load;
-use crate::forces::laboratory::{EdgeTorque, NodeForce};
-use crate::forces::magnetic::Magnetism;
 use crate::kinematics::clamp::{Clamp, ClampedEdge};
 use crate::linear::LinearError;
 use crate::linear::pattern::Pattern;
@@ -456,92 +453,6 @@ fn free_angle(motors: &[Motor], hinge: usize) -> Option<(usize, usize, f64)> {
     })
 }
 
-/// Mass of a solid round edge, half on each node, and its moment of inertia `m a^2 / 2` about the centreline.
-fn masses(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
-    let mut mass = vec![0.0; dof_count];
-    for (k, &[i, j]) in network.edges().iter().enumerate() {
-        let radius = specification.radius[k];
-        let own = specification.density[k] * PI * radius * radius * lengths[k];
-        for node in [i, j] {
-            let dof = network.node_dofs()[node];
-            mass[dof..dof + 3].iter_mut().for_each(|m| *m += 0.5 * own);
-        }
-        mass[network.edge_dofs()[k]] = 0.5 * own * radius * radius;
-    }
-    if let Some(head) = &specification.head {
-        let dof = network.node_dofs()[head.node];
-        mass[dof..dof + 3].iter_mut().for_each(|m| *m += head.mass);
-    }
-    mass
-}
-
-/// Resistance of every edge to spinning about its centreline, N m s.
-fn spin_resistances(specification: &Specification, lengths: &[f64]) -> Vec<f64> {
-    let Some(fluid) = specification.fluid.as_ref().filter(|fluid| fluid.twist_drag) else {
-        return vec![0.0; lengths.len()];
-    };
-    let resistance = |edge: usize| 4.0 * PI * fluid.viscosity * specification.radius[edge].powi(2) * lengths[edge];
-    (0..lengths.len()).map(|edge| if fluid.immersed[edge] { resistance(edge) } else { 0.0 }).collect()
-}
-
-fn dissipative_terms(
-    specification: &Specification,
-    network: &Network,
-    dof_count: usize,
-    lengths: &[f64],
-) -> Vec<Box<dyn Term>> {
-    let mut terms: Vec<Box<dyn Term>> = Vec::new();
-    if let Some(fluid) = specification.fluid.as_ref().filter(|fluid| fluid.twist_drag) {
-        let edges: Vec<usize> = (0..network.edges().len()).filter(|&edge| fluid.immersed[edge]).collect();
-        let spin = spin_resistances(specification, lengths);
-        let coefficients = edges.iter().map(|&edge| spin[edge]).collect();
-        if !edges.is_empty() {
-            terms.push(Box::new(TwistDrag::new(network, edges, coefficients)));
-        }
-    }
-    if let Some(head) = &specification.head {
-        let drag = [head.translation, head.rotation];
-        terms.push(Box::new(Head::new(network, head.node, head.edges.clone(), lengths, drag)));
-    }
-    let forces = weights(specification, network, dof_count, lengths);
-    if forces.iter().any(|&force| force != 0.0) {
-        terms.push(Box::new(Loads::new(forces)));
-    }
-    terms
-}
-
-/// Regularization of every immersed edge, m, and zero for dry ones and other models.
-fn regularization(specification: &Specification) -> Vec<f64> {
-    let mut out = vec![0.0; specification.edges.len()];
-    if let Some(fluid) = &specification.fluid
-        && let FluidModelSpecification::StokesletSegments { epsilon, .. } = &fluid.model
-    {
-        let wet = fluid.immersed.iter().zip(epsilon);
-        out.iter_mut().zip(wet).for_each(|(out, (&wet, &epsilon))| *out = if wet { epsilon } else { 0.0 });
-    }
-    out
-}
-
-/// Weight less buoyancy on every degree of freedom, N.
-fn weights(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
-    let mut forces = vec![0.0; dof_count];
-    let mut add = |node: usize, force: Vec3| {
-        let dof = network.node_dofs()[node];
-        (0..3).for_each(|c| forces[dof + c] += force[c]);
-    };
-    for (k, &[i, j]) in network.edges().iter().enumerate() {
-        let buoyancy = specification.fluid.as_ref().map_or(0.0, |fluid| fluid.density);
-        let volume = PI * specification.radius[k].powi(2) * lengths[k];
-        let weight = specification.gravity * ((specification.density[k] - buoyancy) * volume);
-        add(i, weight * 0.5);
-        add(j, weight * 0.5);
-    }
-    if let Some(head) = &specification.head {
-        add(head.node, specification.gravity * head.mass);
-    }
-    forces
-}
-
 fn clamps(specification: &Specification, network: &Network, dof_count: usize) -> (Vec<Clamp>, Vec<bool>) {
     let mut prescribed = vec![false; dof_count];
     let clamps = specification
@@ -567,56 +478,4 @@ fn clamps(specification: &Specification, network: &Network, dof_count: usize) ->
         })
         .collect();
     (clamps, prescribed)
-}
-
-/// Terms of loads that follow signals.
-fn load_terms(
-    specification: &Specification,
-    network: &Network,
-    lengths: &[f64],
-    inputs: &mut load::Inputs,
-) -> Vec<Box<dyn Term>> {
-    let mut terms: Vec<Box<dyn Term>> = Vec::new();
-    for load in &specification.loads {
-        let channels = inputs.add_vector(load.signal.clone());
-        // Per length: half of an edge's share goes to each of its nodes.
-        let halves = |edge: usize| (edge, [0.5 * lengths[edge]; 2]);
-        let whole = |edge: usize| (edge, lengths[edge]);
-        let term: Box<dyn Term> = match (&load.kind, load.frame) {
-            (LoadKind::NodeForce { node, .. }, Frame::Laboratory) => {
-                Box::new(NodeForce::new(network, &[(*node, 1.0)], channels))
-            }
-            (LoadKind::NodeForce { node, edge }, Frame::Material) => {
-                let weights = network.edges()[*edge].map(|end| if end == *node { 1.0 } else { 0.0 });
-                Box::new(FollowerForce::new(network, vec![(*edge, weights)], channels))
-            }
-            (LoadKind::ForcePerLength { edges }, Frame::Laboratory) => {
-                let shares = |&edge: &usize| network.edges()[edge].map(|node| (node, 0.5 * lengths[edge]));
-                let nodes: Vec<(usize, f64)> = edges.iter().flat_map(shares).collect();
-                Box::new(NodeForce::new(network, &nodes, channels))
-            }
-            (LoadKind::ForcePerLength { edges }, Frame::Material) => {
-                let edges = edges.iter().map(|&edge| halves(edge)).collect();
-                Box::new(FollowerForce::new(network, edges, channels))
-            }
-            (LoadKind::EdgeTorque { edge }, Frame::Laboratory) => {
-                Box::new(EdgeTorque::new(network, vec![(*edge, 1.0)], channels))
-            }
-            (LoadKind::EdgeTorque { edge }, Frame::Material) => {
-                Box::new(FollowerTorque::new(network, vec![(*edge, 1.0)], channels))
-            }
-            (LoadKind::TorquePerLength { edges }, Frame::Laboratory) => {
-                Box::new(EdgeTorque::new(network, edges.iter().map(|&edge| whole(edge)).collect(), channels))
-            }
-            (LoadKind::TorquePerLength { edges }, Frame::Material) => {
-                Box::new(FollowerTorque::new(network, edges.iter().map(|&edge| whole(edge)).collect(), channels))
-            }
-        };
-        terms.push(term);
-    }
-    if let Some(magnetism) = &specification.magnetism {
-        let channels = inputs.add_vector(magnetism.field.clone());
-        terms.push(Box::new(Magnetism::new(network, magnetism.moments.clone(), channels, magnetism.gradient)));
-    }
-    terms
 }
