@@ -142,7 +142,7 @@ impl Simulation {
                 return Ok(());
             }
             let control = self.state.control;
-            self.restore(before);
+            self.go_back(before);
             self.state.control = control;
             self.statistics.steps = accepted;
             self.shrink(both.map(|_| ()), dt, limit)?;
@@ -179,7 +179,7 @@ impl Simulation {
             }
             Err(TryError::Interrupted) => return Err(StepError::Interrupted),
             Err(TryError::Signal(error)) => return Err(StepError::Signal(error)),
-            Ok(false) | Err(TryError::Solve { .. }) => self.restore(before.clone()),
+            Ok(false) | Err(TryError::Solve { .. }) => self.go_back(before.clone()),
         }
         self.state.control = before.control;
         Ok(())

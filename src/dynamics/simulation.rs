@@ -133,6 +133,12 @@ impl Simulation {
 
     /// Takes over a saved state of the same model.
     pub fn restore(&mut self, state: State) {
+        self.go_back(state);
+        self.progress = Progress::from(self.statistics.newton_iterations, self.state.time);
+    }
+
+    /// Goes back to a state from which steps were tried: the work that they took still counts.
+    pub(super) fn go_back(&mut self, state: State) {
         if let (Some(law), Some(barrier)) = (self.model.barrier(), &mut self.balance.barrier) {
             let positions = state.positions(&self.model.network);
             barrier.ensure_at(law, if state.contact_anchor.is_empty() { &positions } else { &state.contact_anchor });
@@ -140,7 +146,6 @@ impl Simulation {
         self.state = state;
         self.fluid_step = None;
         self.given = None;
-        self.progress = Progress::from(self.statistics.newton_iterations, self.state.time);
     }
 
     /// As [`Self::restore`], for a state from elsewhere.
