@@ -27,6 +27,9 @@ use crate::forces::outside::{ForceFunction, OutsideForce};
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
 
+/// Coordinates over the shortest edge beyond which strains are round-off.
+const FARTHEST: f64 = 1e12;
+
 /// Part of a fixed step below which one is an instant.
 const INSTANT: f64 = 1e-3;
 
@@ -285,6 +288,7 @@ impl Simulation {
             return Err(self.interrupted());
         }
         let (drives, departure, impulses, load_impulses) = solved?;
+        self.check_reach()?;
         let missed = self.state.history.prediction_errors(
             (t0, &self.state.q),
             (t1, &self.trial.q),
@@ -310,6 +314,24 @@ impl Simulation {
             self.accept(drives, dt, order, &missed);
         }
         Ok(accepted)
+    }
+
+    /// Refuses a trial so far away that round-off of its coordinates is no longer small against its edges: unstable steps lead there.
+    fn check_reach(&self) -> Result<(), TryError> {
+        let model = &self.model;
+        let configuration = self.balance.configuration();
+        let shortest =
+            (0..model.network.edges().len()).map(|edge| configuration.length(edge)).fold(f64::INFINITY, f64::min);
+        let coordinates = model.network.node_dofs().iter().flat_map(|&dof| dof..dof + 3);
+        match coordinates.into_iter().find(|&dof| self.trial.q[dof].abs() > FARTHEST * shortest) {
+            None => Ok(()),
+            Some(dof) => Err(TryError::Solve {
+                residual: f64::NAN,
+                iterations: 0,
+                worst: Some(dof),
+                reason: "nodes fly away, which steps too long for the scheme let them do".to_owned(),
+            }),
+        }
     }
 
     /// Back to the last good state, as if the step had not been tried.
