@@ -108,6 +108,11 @@ impl Account {
         })
     }
 
+    /// Whether all of it are numbers.
+    pub(super) fn is_finite(&self) -> bool {
+        self.numbers().iter().all(|number| number.is_finite())
+    }
+
     /// Begins at a state with these energies.
     pub(super) fn begin(&mut self, time: f64, stored: [f64; 3]) {
         let start: f64 = stored.iter().sum();

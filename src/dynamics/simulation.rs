@@ -311,7 +311,7 @@ impl Simulation {
             (self.state.control, accepted) = control.judge(&times, t1, &estimate);
         }
         if accepted {
-            self.accept(drives, dt, order, &missed);
+            self.accept(drives, dt, order, &missed)?;
         }
         Ok(accepted)
     }
@@ -445,7 +445,7 @@ impl Simulation {
         }
     }
 
-    fn accept(&mut self, drives: Drives, dt: f64, order: usize, missed: &[f64]) {
+    fn accept(&mut self, drives: Drives, dt: f64, order: usize, missed: &[f64]) -> Result<(), TryError> {
         let step = Step::new(self.scheme, &self.state, dt, order, drives);
         let increment = step.increment();
         let velocity: Vec<f64> =
@@ -462,6 +462,14 @@ impl Simulation {
             shortest_lasting: INSTANT * self.dt,
         });
         let angles = step.into_drives().motor_angles;
+        if !account.is_finite() {
+            return Err(TryError::Solve {
+                residual: f64::NAN,
+                iterations: 0,
+                worst: None,
+                reason: "energies grow beyond all bounds, which steps too long for the scheme let them do".to_owned(),
+            });
+        }
         let state = &mut self.state;
         state.account = account;
         let replaced = Sample {
@@ -490,6 +498,7 @@ impl Simulation {
             self.statistics.contact_searches = barrier.searches();
         }
         self.statistics.steps += 1;
+        Ok(())
     }
 }
 
