@@ -27,8 +27,8 @@ use crate::forces::outside::{ForceFunction, OutsideForce};
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
 
-/// Coordinates over the shortest edge beyond which strains are round-off.
-const FARTHEST: f64 = 1e12;
+/// Coordinates over the size of a filament beyond which its strains are round-off.
+const FARTHEST: f64 = 1e10;
 
 /// Part of a fixed step below which one is an instant.
 const INSTANT: f64 = 1e-3;
@@ -316,14 +316,12 @@ impl Simulation {
         Ok(accepted)
     }
 
-    /// Refuses a trial so far away that round-off of its coordinates is no longer small against its edges: unstable steps lead there.
+    /// Refuses a trial so far away that round-off of its coordinates is no longer small against its filament: unstable steps lead
+    /// there.
     fn check_reach(&self) -> Result<(), TryError> {
-        let model = &self.model;
-        let configuration = self.balance.configuration();
-        let shortest =
-            (0..model.network.edges().len()).map(|edge| configuration.length(edge)).fold(f64::INFINITY, f64::min);
-        let coordinates = model.network.node_dofs().iter().flat_map(|&dof| dof..dof + 3);
-        match coordinates.into_iter().find(|&dof| self.trial.q[dof].abs() > FARTHEST * shortest) {
+        let Model { network, error_weight, .. } = &self.model;
+        let mut coordinates = network.node_dofs().iter().flat_map(|&dof| dof..dof + 3);
+        match coordinates.find(|&dof| self.trial.q[dof].abs() * error_weight[dof] > FARTHEST) {
             None => Ok(()),
             Some(dof) => Err(TryError::Solve {
                 residual: f64::NAN,
