@@ -58,7 +58,7 @@ class Simulation(ReadOuts):
         What is simulated.
     scheme
         ``overdamped``: no inertia, fluid and elasticity implicit, first order, the default; ``implicit``:
-        the same with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the
+        the same with inertia; ``explicit``: Lim et al.'s scheme, with the fluid forces of the
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
         Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest

@@ -58,7 +58,7 @@ def full_scene() -> Scene:
                 name="Y",
             ),
         ],
-        fluid=Fluid(viscosity=third, model="RFT", epsilon="seed", density=1000.0),
+        fluid=Fluid(viscosity=third, model="RFT", epsilon="lim-et-al", density=1000.0),
         head=Head(node=1, radius=third * 1e-2),
         motors=[Motor(node=2, shaft=2, torque=Table(times=[0.0, third], values=[third, 2.0]))],
         clamps=[Clamp(rod=1, nodes=(0,), edges=(0,), angular_velocity=third)],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import flagrs
@@ -219,11 +220,22 @@ def test_a_part_that_cannot_be_is_refused_by_name(build: Callable[[], Any], fiel
 
 
 @pytest.mark.parametrize(
-    ("epsilon", "expected"), [("slender", math.exp(0.5) * 2e-3), ("seed", 1.031 * 2e-3), (5e-4, 5e-4)]
+    ("epsilon", "expected"), [("slender", math.exp(0.5) * 2e-3), ("lim-et-al", 1.031 * 2e-3), (5e-4, 5e-4)]
 )
 def test_the_regularization_is_chosen_by_name_or_length(epsilon: Any, expected: float) -> None:
     found = Fluid(viscosity=1.0, epsilon=epsilon).epsilon_array(np.full(3, 2e-3))
     assert found == pytest.approx(np.full(3, expected), rel=1e-15)
+
+
+def test_the_former_name_of_a_regularization_is_understood_with_a_warning(tmp_path: Path) -> None:
+    with pytest.warns(DeprecationWarning, match="now called 'lim-et-al'"):
+        former = Fluid(viscosity=1.0, epsilon="seed")  # type: ignore[arg-type]
+    assert former == Fluid(viscosity=1.0, epsilon="lim-et-al") and former.epsilon == "lim-et-al"
+    path = tmp_path / "scene.toml"
+    Scene(rods=[rod()], fluid=former).to_toml(path)
+    path.write_text(path.read_text().replace("lim-et-al", "seed"))
+    with pytest.warns(DeprecationWarning, match="epsilon='seed'"):
+        assert Scene.from_toml(path) == Scene(rods=[rod()], fluid=former)
 
 
 # --- scenes -------------------------------------------------------------------------------------------------
