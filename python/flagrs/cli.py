@@ -143,7 +143,7 @@ def study(
         int | None, typer.Option(help="Worker processes; by default one per processor.")
     ] = None,
 ) -> None:
-    """Repeat a study of the supplementary text: speed against rpm, for meshes or for geometries."""
+    """Repeat a study of Lim et al.: speed against rpm, for meshes or for geometries."""
     from flagrs import study as studies  # the other commands do without
 
     carry_out = studies.convergence if which == "convergence" else studies.geometries

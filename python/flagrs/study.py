@@ -1,4 +1,4 @@
-"""The studies of the supplementary text: convergence with the mesh, and three geometries of the flagella."""
+"""The studies of Lim et al.: convergence with the mesh, and three geometries of the flagella."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flagrs.runs import RunSettings
 from flagrs.sweep import Case
 
 RPMS = tuple(float(rpm) for rpm in range(5, 55, 5))
-#: 37, 41, 45, 51, 59 and 73 nodes, as in the text, and one mesh more, of 81; in metres.
+#: 37, 41, 45, 51, 59 and 73 nodes, as in Lim et al., and one mesh more, of 81; in metres.
 EDGE_LENGTHS = (9e-3, 8e-3, 7e-3, 6e-3, 5e-3, 4e-3, 3.5e-3)
 PITCHES = (5.0, 7.0, 9.0)
 

@@ -1,6 +1,6 @@
 //! Motors: a hinge whose shaft edge turns against its housing edge.
 //!
-//! The seed takes the motor angle off the twist only (equation 4). The bending energy of the hinge would then carry a
+//! Lim et al. take the motor angle off the twist only (equation 4). The bending energy of the hinge would then carry a
 //! factor `cos^2(phi/2)`, and the joint would lose its bending stiffness once a turn; here the shaft's material frame
 //! is turned back by the motor angle in curvature and twist alike ([`crate::rod::configuration::Configuration::update`]).
 
