@@ -21,8 +21,8 @@
 //!   fields; [`fluid`], drag models and the head; [`contact`], distances and contact forces.
 //! * What moves it: [`model`], the constant part of a scene; [`state`], the changing one; [`inputs`], what drives; [`step`], the equations of
 //!   one step; [`simulation`], step after step.
-//! * Imports run one way: `linear, nonlinear, bdf, signal, runtime <- rod, kinematics <- elastic, forces, fluid, contact <- model <- state <- step <-
-//!   simulation <- python`.
+//! * Imports run one way: `linear, nonlinear, bdf, signal, runtime <- rod, kinematics <- elastic, forces, fluid, contact <- model <- state, inputs <-
+//!   step <- simulation <- python`.
 //! * [`simulation::Simulation`] is the way in.
 
 pub mod bdf;

@@ -15,7 +15,7 @@ use flagrs::simulation::Simulation;
 use flagrs::step::scheme::Scheme;
 
 fn filaments(specification: Specification) -> (Vec<usize>, Vec<Filament>) {
-    let (model, _) = Model::new(specification).expect("the scene is valid");
+    let model = Model::new(specification).expect("the scene is valid");
     (model.filaments().of_dof().to_vec(), model.filaments().all().to_vec())
 }
 
