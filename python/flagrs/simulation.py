@@ -21,6 +21,7 @@ from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.flow import flow_of, immersed_edges
+from flagrs.force_density import ForceDensity
 from flagrs.frame_times import check_frames, frame_times
 from flagrs.guards import Guards, Notice, StabilityWarning, check_contact
 from flagrs.memory import require_memory
@@ -491,7 +492,8 @@ class Simulation:
 
     def frame(self) -> dict[str, Any]:
         """Return everything known of the present instant; see `flagrs.frame.FIELDS` for shapes and units."""
-        return self._native.frame()
+        frame = self._native.frame()
+        return frame | {"force_density": ForceDensity(frame["force_density"], self.immersed_edges)}
 
     def state(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that changes, to the last bit."""

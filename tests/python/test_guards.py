@@ -171,15 +171,38 @@ def test_flow_at_the_immersed_nodes_is_their_velocity_and_dry_edges_have_no_part
     speed = np.linalg.norm(simulation.velocities[wet], axis=1).max()
     # No slip, but for the fluid's geometry, which is that of the step's beginning.
     assert flow == pytest.approx(simulation.velocities[wet], abs=5e-3 * speed)
+    # A dry edge would carry half a hat of the density of the node that it shares with an immersed one.
+    density = simulation.frame()["force_density"]
     naive = flagrs.fluid.velocity(
-        simulation.nodes[wet],
-        simulation.nodes,
-        simulation.edges,
-        simulation.frame()["force_density"],
-        1.0,
-        1.65e-3,
+        simulation.nodes[wet], simulation.nodes, simulation.edges, np.array(density), 1.0, 1.65e-3
     )
     assert np.abs(naive - simulation.velocities[wet]).max() > 0.05 * speed
+
+
+def test_a_force_density_is_refused_on_dry_edges():
+    simulation = flagrs.Simulation(flagrs.scenarios.robot(contact=False), dt=1e-3)
+    trajectory = simulation.run(until=0.002, save_every=1e-3, path=False)
+    nodes, edges, wet = simulation.nodes, simulation.edges, simulation.immersed_edges
+    assert len(wet) < len(edges)
+    fast = flagrs.fluid.FastMobility(nodes, edges, 1e-3)
+    for density in (
+        simulation.frame()["force_density"],
+        trajectory.force_density[-1],
+        *trajectory.force_density,
+    ):
+        for use in (
+            lambda density=density: flagrs.fluid.velocity(nodes[:1], nodes, edges, density, 1.0, 1e-3),
+            lambda density=density: flagrs.fluid.hat_weights(nodes, edges, density),
+            lambda density=density: fast.apply(density),
+        ):
+            with pytest.raises(flagrs.SceneError, match=r"edges: edge \d+ from node .* immersed_edges"):
+                use()
+        # The immersed ones, in whatever direction, and plain arrays, which know no edges.
+        flagrs.fluid.velocity(nodes[:1], nodes, wet[:, ::-1], density, 1.0, 1e-3)
+        flagrs.fluid.hat_weights(nodes, edges, 1.0 * density)
+    assert type(2.0 * trajectory.force_density) is np.ndarray
+    assert isinstance(trajectory.force_density.max(), float)
+    assert trajectory.force_density[:, :3].edges is None
 
 
 def test_thrust_of_the_robot_is_the_drag_of_its_head():
