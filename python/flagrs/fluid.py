@@ -101,8 +101,8 @@ def velocity(
     Raises
     ------
     SceneError
-        As `mobility`, for a viscosity that is not positive, and for edges that are not among the immersed ones
-        of a density which a simulation or trajectory gave.
+        As `mobility`, for a viscosity that is not positive, and for edges that are not among the immersed
+        ones of a density which a simulation or trajectory gave.
 
     Examples
     --------

@@ -60,8 +60,8 @@ def check_edges(density: Any, edges: IntArray) -> None:
     if len(dry):
         first = int(dry[0])
         raise SceneError(
-            f"edges: edge {first} from node {edges[first, 0]} to {edges[first, 1]} is not allowed; must be one "
-            "of the immersed edges, on which this force density lives: take immersed_edges, or flow()",
+            f"edges: edge {first} from node {edges[first, 0]} to {edges[first, 1]} is not allowed; must be "
+            "one of the immersed edges, on which this force density lives: take immersed_edges, or flow()",
             field="edges",
             value=edges[first].tolist(),
             allowed="the immersed edges of the scene",

@@ -16,7 +16,7 @@ from flagrs.trajectory import Trajectory
 
 HERE = Path(__file__).parent
 
-#: Writes into the folder $FAIL_IN fail with EIO from that with the number $FAIL_AT on: all, or one if $FAIL_ONCE.
+#: Writes into the folder $FAIL_IN fail with EIO, from number $FAIL_AT on: all, or that one if $FAIL_ONCE.
 SHIM = r"""
     #define _GNU_SOURCE
     #include <dlfcn.h>
