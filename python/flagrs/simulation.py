@@ -23,7 +23,7 @@ from flagrs.files import same_file
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.force_density import ForceDensity
 from flagrs.frame_times import check_frames, frame_times
-from flagrs.guards import Guards, Notice, StabilityWarning, check_contact
+from flagrs.guards import Guards, Notice, StabilityWarning, check_contact, check_turn
 from flagrs.memory import require_memory
 from flagrs.outside_force import ForceFunction, OutsideForce
 from flagrs.progress import bar_for
@@ -143,6 +143,8 @@ class Simulation:
             self._native.set_tolerance(local_tolerance(scene, rtol))
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
+        if dt is not None and rtol is None:
+            check_turn(scene, self.dt)
         self._check_stability()
 
     @classmethod
@@ -196,6 +198,8 @@ class Simulation:
     @dt.setter
     def dt(self, value: float) -> None:
         self._native.dt = number("dt", value, Bounds("s", above=0.0))
+        if self._settings["rtol"] is None:
+            check_turn(self._scene, value)
         self._check_stability()
 
     @property

@@ -77,6 +77,22 @@ def test_adaptive_steps_close_the_budget_more_tightly():
     assert defect[1e-4] < defect[1e-2] < 5e-2
 
 
+@pytest.mark.parametrize(
+    "options, warned", [({"dt": 0.1}, True), ({"dt": 0.03}, False), ({"rtol": 1e-2}, False), ({}, False)]
+)
+def test_steps_in_which_flagella_turn_too_far_are_warned_of(options: dict[str, float], warned: bool):
+    # 15 rad/s: at 1.5 rad a step the two flagella never meet.
+    scene = flagrs.scenarios.clamped_flagella(count=2)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation = flagrs.Simulation(scene, **options)
+    assert [w.category for w in caught] == [flagrs.StepWarning] * warned
+    if warned:
+        assert "a turn of 1.5 rad a step" in str(caught[0].message) and "below 0.033 s" in str(
+            caught[0].message
+        )
+
+
 def test_outer_forces_and_torques_of_a_free_robot_vanish():
     simulation = flagrs.Simulation(flagrs.scenarios.robot(contact=False), dt=0.02)
     simulation.step(20)
