@@ -168,7 +168,7 @@ def check_contact(scene: Scene) -> None:
 
 
 def check_turn(scene: Scene, dt: float) -> None:
-    """Warn of steps of a fixed length [s] in which a motor, a clamp or a flow turns too far to be followed."""
+    """Warn of steps of a fixed length [s] in which a motor, clamp or flow turns too far to follow."""
     rate = fastest_rate(scene)
     if rate * dt > MOST_TURN:
         warnings.warn(
