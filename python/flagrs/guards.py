@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagrs.budget import budget_of
+from flagrs.budget import budget_of, given_by_drag
 from flagrs.contact_scales import suitable_stiffness
 from flagrs.scene import Scene
 from flagrs.scene.values import FloatArray
@@ -101,10 +101,11 @@ def notices(account: FloatArray, scene: Scene) -> Iterator[Notice]:
     """Yield what there is to warn of in a native account (42,) of a scene."""
     time = float(account[0])
     defect = float(budget_of(account[None]).relative_defect[0])
-    if defect < -MOST_MADE:
-        text = f"by t = {time:g} s {-defect:.2g} of all energy came from nowhere: the steps are unstable; "
-        yield Notice("energy made", time, -defect, text + "use a smaller dt, or rtol")
-    if defect > MOST_LOST:
+    made = max(-defect, given_by_drag(account))
+    if made > MOST_MADE:
+        text = f"by t = {time:g} s {made:.2g} of all energy came from nowhere: the steps are unstable; "
+        yield Notice("energy made", time, made, text + "use a smaller dt, or rtol")
+    elif defect > MOST_LOST:
         text = f"by t = {time:g} s the steps have lost {defect:.2g} of all energy: they are too long; "
         yield Notice("energy lost", time, defect, text + "use rtol, or a smaller dt")
     bending, strain, width, reynolds = account[29:41].reshape(4, 3)

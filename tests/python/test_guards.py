@@ -123,6 +123,36 @@ def test_energy_from_nowhere_is_warned_of(stored: float, warned: bool):
     assert found == ["energy made"] * warned
 
 
+@pytest.mark.parametrize("share, warned", [(0.9, False), (1.05, True)])
+def test_explicit_steps_above_their_limit_make_energy_and_warn_of_it(share: float, warned: bool):
+    nodes = np.array([[0.0, 0.0, 0.0], [5e-3, 0.0, 1e-3], [1e-2, 0.0, 1e-3], [1.5e-2, 0.0, 0.0]])
+    material = flagrs.Material(youngs_modulus=1e5, density=2e4)
+    rod = flagrs.Rod(nodes=nodes, rest_nodes=nodes * [1.0, 1.0, 0.0], radius=5e-4, material=material)
+    fluid = flagrs.Fluid(viscosity=1.0, model="RFT", twist_drag=False, density=0.0)
+    scene = flagrs.Scene(rods=rod, fluid=fluid)
+    limit = flagrs.Simulation(scene, scheme="explicit", dt=1e-6).stable_step()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation = flagrs.Simulation(scene, scheme="explicit", dt=share * limit)
+        simulation.step(400)
+    assert [w.category for w in caught if w.category is flagrs.EnergyWarning] == [
+        flagrs.EnergyWarning
+    ] * warned
+    assert ("energy made" in [notice.kind for notice in simulation.warnings]) == warned
+
+
+def test_drag_that_gives_is_energy_from_nowhere():
+    account = np.zeros(42)
+    account[1], account[5], account[19], account[23] = 1.0, -0.04, 1.04, 1.0
+    assert not list(notices(account, flagrs.scenarios.robot()))
+    # The twist drag: no other sink makes up for it.
+    account[5], account[6], account[19] = 0.96, -0.06, 0.1
+    assert [notice.kind for notice in notices(account, flagrs.scenarios.robot())] == ["energy made"]
+    # Contact may give what it has stored.
+    account[5], account[6], account[8], account[19] = 1.0, 0.0, -0.06, 0.06
+    assert not list(notices(account, flagrs.scenarios.robot()))
+
+
 @pytest.mark.parametrize("stretch, warned", [(0.15, False), (0.25, True)])
 def test_strain_beyond_a_fifth_warns(stretch: float, warned: bool):
     clamps = (held(0), held(10, velocity=(0.1 * stretch, 0.0, 0.0)))
