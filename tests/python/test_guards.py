@@ -285,3 +285,55 @@ def test_plan_tells_the_scales_and_asks_about_units():
     text = str(flagrs.Scene(rods=rod, fluid=fluid, gravity=(0.0, 0.0, -9810.0)).plan())
     for question in ("millimetres?", "mPa s?", "mm/s^2?", "another unit?"):
         assert question in text
+
+
+def test_explicit_steps_far_too_long_end_in_words_and_leave_a_state_of_numbers():
+    nodes = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    bent = nodes + np.array([[0.0, 0.0, 0.06], [0.0, 0.0, -0.05], [0.1, 0.1, 0.0]])
+    material = flagrs.Material(youngs_modulus=1e3, density=1000.0)
+    rod = flagrs.Rod(nodes=nodes, rest_nodes=bent, radius=0.01, material=material)
+    fluid = flagrs.Fluid(viscosity=1.0, twist_drag=False, density=0.0)
+    simulation = flagrs.Simulation(flagrs.Scene(rods=rod, fluid=fluid), scheme="explicit")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        simulation.dt *= 100.0
+        with pytest.raises(flagrs.ConvergenceError, match="nodes fly away, which steps too long"):
+            simulation.step(50)
+    # 1e10 times its size away a filament would be no more than round-off of its coordinates.
+    assert np.abs(simulation.nodes).max() < 1e10 * 2.0
+    for name, value in simulation.frame().items():
+        assert np.isfinite(value).all() or name == "minimum_gap", name
+
+
+def test_energies_that_are_no_numbers_end_a_step_in_words():
+    # Nothing but its energy is too large: both nodes are held, and no node goes too far.
+    material = flagrs.Material(youngs_modulus=1e3, density=1000.0)
+    rod = flagrs.Rod(nodes=[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], radius=0.01, material=material, EA=1e300)
+    clamps = (flagrs.Clamp(nodes=(0,)), flagrs.Clamp(nodes=(1,), velocity=(1e6, 0.0, 0.0)))
+    fluid = flagrs.Fluid(viscosity=1.0, model="RFT", density=0.0)
+    simulation = flagrs.Simulation(flagrs.Scene(rods=rod, fluid=fluid, clamps=clamps), dt=1.0)
+    with pytest.raises(flagrs.ConvergenceError, match="energies grow beyond all bounds"):
+        simulation.step()
+    assert all(np.isfinite(value).all() for value in simulation.state().values())
+
+
+def test_velocities_of_an_instant_are_no_reynolds_number():
+    x = np.linspace(0.0, 0.1, 21)
+    kinked = np.stack([x, 0.0 * x, 0.2 * np.abs(x - 0.05)], axis=1)
+    material = flagrs.Material(youngs_modulus=1e6, density=1000.0)
+    rod = flagrs.Rod(nodes=kinked, rest_nodes=kinked * [1.0, 1.0, 0.0], radius=1e-3, material=material)
+    scene = flagrs.Scene(rods=rod, fluid=flagrs.Fluid(viscosity=1.0, model="RFT"))
+    still = flagrs.Simulation(scene)
+    rows = (still.dof_of_node[:, None] + np.arange(3)).ravel()
+    at_once = np.linalg.solve(still.resistance(), -still.gradient()[rows]).reshape(-1, 3)
+    # A thousandth of a fixed step later, by small steps; the size is a twentieth of the length.
+    short = flagrs.Simulation(scene, dt=1e-5 * still.dt)
+    short.step(100)
+    scale = 1000.0 * 0.1 / 20.0
+    soon = scale * np.linalg.norm(short.velocities, axis=1).max()
+    assert scale * np.linalg.norm(at_once, axis=1).max() > 2.0 * soon
+    simulation = flagrs.Simulation(scene, rtol=1e-2)
+    with pytest.warns(flagrs.ReynoldsWarning):
+        simulation.step(10)
+    (notice,) = [notice for notice in simulation.warnings if notice.kind == "reynolds"]
+    assert 0.3 * soon < notice.value < soon
