@@ -20,7 +20,7 @@ from flagrs.errors import FileError, FlagrsError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.frame_times import check_frames, frame_times
-from flagrs.guards import Guards, Notice, StabilityWarning, check_contact
+from flagrs.guards import Guards, Notice, StabilityWarning, check_contact, check_turn
 from flagrs.memory import require_memory
 from flagrs.outside_force import ForceFunction, OutsideForce
 from flagrs.progress import bar_for
@@ -134,6 +134,8 @@ class Simulation(ReadOuts):
             self._native.set_tolerance(local_tolerance(scene, rtol))
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
+        if dt is not None and rtol is None:
+            check_turn(scene, self.dt)
         self._check_stability()
 
     @classmethod
@@ -187,6 +189,7 @@ class Simulation(ReadOuts):
         self._native.dt = number("dt", value, Bounds("s", above=0.0))
         self._settings.update(dt=self._native.dt, rtol=None)
         self._native.set_tolerance(None)
+        check_turn(self._scene, value)
         self._check_stability()
 
     @property
