@@ -75,6 +75,8 @@ def stiffer_twisting(factor: float) -> Any:
         "relaxation_in_time",
         "localized_buckling",
         "whirling",
+        "flutter",
+        "buckling_in_extension",
     ],
 )
 def test_a_bending_stiffness_off_by_half_a_per_cent_is_found(
@@ -82,6 +84,13 @@ def test_a_bending_stiffness_off_by_half_a_per_cent_is_found(
 ) -> None:
     monkeypatch.setattr(Rod, "EI_array", stiffer_bending(1.005))
     assert not solve(PROBLEMS[name]).passed
+
+
+def test_references_of_instabilities_are_the_published_numbers() -> None:
+    assert flutter.threshold("tip") == pytest.approx(37.6954, abs=5e-5)
+    assert flutter.linear_mode(37.6954, "tip")[0].imag == pytest.approx(191.26, abs=5e-3)
+    assert flutter.threshold("distributed") == pytest.approx(76.1021, abs=5e-5)
+    assert straining.threshold(0.5) == pytest.approx(153.202, abs=5e-4)
 
 
 @pytest.mark.parametrize("name", ["loaded_strip", "heavy_strip", "untwisting", "helical_spring"])
