@@ -12,6 +12,7 @@ from flagrs import Rod, SceneError, Simulation, fluid
 from flagrs.cli import app
 from flagrs.validation import PROBLEMS, Check, Outcome, Problem, chosen, solve, validate
 from flagrs.validation.problem import Evidence, converging, extrapolated, observed_order
+from flagrs.validation.problems import flutter, straining
 from flagrs.validation.problems.relaxation import wave_numbers
 from flagrs.validation.report import write_report
 from flagrs.validation.table import plain
