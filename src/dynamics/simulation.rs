@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::adaptive::LONGEST_STEP;
 use super::balance::{Balance, Drives, Step, Unknowns};
 use super::budget::Accepted;
 use super::contact_model::ContactModel;
@@ -309,6 +310,7 @@ impl Simulation {
             let highest_order = if self.force.is_some() { 1 } else { self.scheme.highest_order() };
             let estimate = Estimate { missed: &missed, unseen, tolerance, highest_order };
             (self.state.control, accepted) = control.judge(&times, t1, &estimate);
+            self.state.control.dt = self.state.control.dt.min(LONGEST_STEP * self.dt);
         }
         if accepted {
             self.accept(drives, dt, order, &missed)?;
