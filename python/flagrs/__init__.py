@@ -9,6 +9,7 @@ from flagrs.guards import (
     MeshWarning,
     ReynoldsWarning,
     StabilityWarning,
+    StationarityWarning,
     StrainWarning,
 )
 from flagrs.scene import (
@@ -65,6 +66,7 @@ __all__ = [
     "SceneError",
     "Simulation",
     "StabilityWarning",
+    "StationarityWarning",
     "StrainWarning",
     "Suggestion",
     "Table",
