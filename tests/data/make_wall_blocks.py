@@ -150,8 +150,22 @@ def cases():
         yield f"random {number}", (point, normal), target, start, end, length * 10.0 ** draw.uniform(-3, 0)
     for depth in range(4):  # slender edges that all but lie on the plane z = 0, with the target on them
         low = 10.0**-depth
-        yield f"near {depth}", ([0.0] * 3, [0.0, 0.0, 1.0]), [0.3, 0.0, low], [0.0, 0.0, low], [1.0, 0.0, low], low
-        yield f"steep {depth}", ([0.0] * 3, [0.0, 0.0, 1.0]), [0.0, 0.0, low], [0.0, 0.0, low], [0.0, 0.1, 1.0], low
+        yield (
+            f"near {depth}",
+            ([0.0] * 3, [0.0, 0.0, 1.0]),
+            [0.3, 0.0, low],
+            [0.0, 0.0, low],
+            [1.0, 0.0, low],
+            low,
+        )
+        yield (
+            f"steep {depth}",
+            ([0.0] * 3, [0.0, 0.0, 1.0]),
+            [0.0, 0.0, low],
+            [0.0, 0.0, low],
+            [0.0, 0.1, 1.0],
+            low,
+        )
 
 
 with (Path(__file__).parent / "wall_blocks.csv").open("w", newline="") as file:
