@@ -9,6 +9,8 @@ from flagrs.guards import (
     MeshWarning,
     ReynoldsWarning,
     StabilityWarning,
+    StationarityWarning,
+    StepWarning,
     StrainWarning,
 )
 from flagrs.scene import (
@@ -65,6 +67,8 @@ __all__ = [
     "SceneError",
     "Simulation",
     "StabilityWarning",
+    "StationarityWarning",
+    "StepWarning",
     "StrainWarning",
     "Suggestion",
     "Table",

@@ -10,6 +10,7 @@ import scipy.sparse
 from flagrs import _flagrs
 from flagrs.assemble import edges_of
 from flagrs.flow import flow_of, immersed_edges
+from flagrs.force_density import ForceDensity
 from flagrs.memory import require_memory
 from flagrs.scene import Scene
 from flagrs.scene.values import FloatArray, IntArray
@@ -142,4 +143,5 @@ class ReadOuts:
 
     def frame(self) -> dict[str, Any]:
         """Return everything known of the present instant; see `flagrs.frame.FIELDS` for shapes and units."""
-        return self._native.frame()
+        frame = self._native.frame()
+        return frame | {"force_density": ForceDensity(frame["force_density"], self.immersed_edges)}

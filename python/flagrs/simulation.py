@@ -16,11 +16,11 @@ from flagrs import _flagrs
 from flagrs.assemble import native_scene
 from flagrs.budget import statistics_of
 from flagrs.default_step import default_step
-from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
+from flagrs.errors import FileError, FlagrsError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.frame_times import check_frames, frame_times
-from flagrs.guards import Guards, Notice, StabilityWarning, check_contact
+from flagrs.guards import Guards, Notice, StabilityWarning, check_contact, check_turn
 from flagrs.memory import require_memory
 from flagrs.outside_force import ForceFunction, OutsideForce
 from flagrs.progress import bar_for
@@ -31,6 +31,7 @@ from flagrs.scene.scene import check_scene
 from flagrs.scene.shapes import number, whole
 from flagrs.scene.values import Bounds
 from flagrs.simulation_input import check_scheme, real_array, state_part
+from flagrs.step_choice import RelativeError, chosen_rtol, steps_in_words
 from flagrs.threads import thread_count
 from flagrs.time_step import (
     STABLE_SHARE,
@@ -61,14 +62,15 @@ class Simulation(ReadOuts):
         the same with inertia; ``explicit``: Lim et al.'s scheme, with the fluid forces of the
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
-        Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
+        Length of fixed steps of first order [s]; given together with `rtol`, the scale of the first adaptive
+        step. None, for fixed steps: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
         motor or less where filaments relax faster; a fifth of the stability limit for the explicit scheme,
         which warns (`flagrs.StabilityWarning`) of longer ones than that limit.
     rtol
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
-        of node positions, relative to the size of the filament they are on (docs/theory/time.md). None:
-        steps of `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first
-        step.
+        of node positions, relative to the size of the filament they are on (docs/theory/time.md). ``auto``,
+        the default: 1e-3, but fixed steps if `dt` is given or the scheme is the explicit one, which has no
+        others. None: fixed steps.
     force
         A function that gives forces from outside, called once at the beginning of every step with the time
         [s], nodes (N, 3) [m], velocities (N, 3) [m/s] and directors (E, 3, 3), rows ``m1, m2, t``. It returns
@@ -98,7 +100,7 @@ class Simulation(ReadOuts):
         scene: Scene,
         scheme: str = "overdamped",
         dt: float | None = None,
-        rtol: float | None = None,
+        rtol: RelativeError = "auto",
         force: ForceFunction | None = None,
         threads: int | None = None,
     ) -> None:
@@ -108,18 +110,10 @@ class Simulation(ReadOuts):
             scene.plan().memory,
             "take longer edges, or leave Fluid.far_field_nodes as it is",
         )
-        if rtol is not None:
-            number("rtol", rtol, Bounds("1", at_least=1e-8, at_most=0.1))
-        if rtol is not None and scheme == "explicit":
-            raise SceneError(
-                f"rtol: {rtol} is not allowed with the explicit scheme; must be None",
-                field="rtol",
-                value=rtol,
-                allowed="None with the explicit scheme",
-            )
         step = default_step(scene) if dt is None else number("dt", dt, Bounds("s", above=0.0))
         check_scheme(scene, scheme)
         check_contact(scene)
+        rtol = chosen_rtol(rtol, dt, scheme)
         self._scene = scene
         native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
         self._exclusive = Exclusive(native, "the simulation")
@@ -131,6 +125,7 @@ class Simulation(ReadOuts):
             "threads": threads,
             "force": None if force is None else repr(force),
         }
+        self._force = force
         self._guards = Guards(scene)
         self._restored: Path | None = None
         if force is not None:
@@ -139,6 +134,8 @@ class Simulation(ReadOuts):
             self._native.set_tolerance(local_tolerance(scene, rtol))
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
+        if dt is not None and rtol is None:
+            check_turn(scene, self.dt)
         self._check_stability()
 
     @classmethod
@@ -181,13 +178,31 @@ class Simulation(ReadOuts):
 
     @property
     def dt(self) -> float:
-        """Length of a step [s]."""
+        """Length of fixed steps, scale of the first adaptive one [s].
+
+        Setting it asks for fixed steps of that length from now on.
+        """
         return self._native.dt
 
     @dt.setter
     def dt(self, value: float) -> None:
         self._native.dt = number("dt", value, Bounds("s", above=0.0))
+        self._settings.update(dt=self._native.dt, rtol=None)
+        self._native.set_tolerance(None)
+        check_turn(self._scene, value)
         self._check_stability()
+
+    @property
+    def rtol(self) -> float | None:
+        """Relative error that adaptive steps keep to; None for fixed steps. It may be set."""
+        rtol: float | None = self._settings["rtol"]
+        return rtol
+
+    @rtol.setter
+    def rtol(self, value: float | None) -> None:
+        rtol = chosen_rtol(value, None, self.scheme)
+        self._settings["rtol"] = rtol
+        self._native.set_tolerance(None if rtol is None else local_tolerance(self._scene, rtol))
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
@@ -207,10 +222,10 @@ class Simulation(ReadOuts):
         return self._native.statistics() | numbers | {"warnings": len(self._guards.found)}
 
     def step(self, n: int = 1) -> None:
-        """Make n steps of `dt`.
+        """Make n steps; an adaptive one is made of two parts at the start and after a jump.
 
-        A step that does not converge is made in halves, quarters and so on, or, with `rtol`, again with 0.4
-        of its length.
+        Their length is what the relative error allows, or `dt` if steps are fixed. A fixed step that does not
+        converge is made in halves, quarters and so on, an adaptive one again with 0.4 of its length.
 
         Raises
         ------
@@ -232,7 +247,8 @@ class Simulation(ReadOuts):
     ) -> Trajectory:
         """Run until a time and return what was recorded.
 
-        Steps are shortened a little so that a whole number of them makes `save_every`. The file is
+        Frames between adaptive steps are interpolated; fixed steps are shortened a little so that a whole
+        number of them makes `save_every`. The file is
         complete at any moment: a run that is killed can be read, and gone on with by `Simulation.restore`.
 
         Parameters
@@ -309,7 +325,7 @@ class Simulation(ReadOuts):
 
     def _frame_at(self, time: float, end: float) -> dict[str, Any]:
         """Return the frame at a time, reached by fixed steps or interpolated between adaptive ones."""
-        if self._settings["rtol"] is None:
+        if self.rtol is None:
             self._reach(time)
             return self.frame()
         self._native.advance_past(time, end)
@@ -412,9 +428,8 @@ class Simulation(ReadOuts):
     def __copy__(self) -> Self:
         """Return a simulation of its own at the same state, which goes on to the same bits."""
         with self._exclusive.held():
-            options = self._settings
-            twin = type(self)(self._scene, **options)
-            twin.dt = self.dt
+            twin = type(self)(self._scene, **(self._settings | {"force": self._force}))
+            twin._native.dt = self.dt
             twin.load_state(self.state())
         return twin
 
@@ -431,4 +446,5 @@ class Simulation(ReadOuts):
 
     def __repr__(self) -> str:
         """Describe the simulation in a line."""
-        return f"<flagrs.Simulation of {self._scene.name!r}: {self._native!r}>"
+        steps = steps_in_words(self.rtol, self.dt)
+        return f"<flagrs.Simulation of {self._scene.name!r}: {self._native!r}, {steps}>"

@@ -4,25 +4,35 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from flagrs import trajectory_file
+from flagrs.assemble import edges_of
 from flagrs.budget import EnergyBudget, budget_of
 from flagrs.errors import FileError, FlagrsError
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.fluid import hat_weights
+from flagrs.force_density import ForceDensity
 from flagrs.frame import shapes_of
-from flagrs.guards import Notice, notices
+from flagrs.guards import Notice, StationarityWarning, notices
 from flagrs.measures import along, angle_about, slope, spin_about, window
+from flagrs.results.bundle import Bundle, bundle_of
+from flagrs.results.material_frames import directors
+from flagrs.results.readouts import ReadOuts, readouts_of
+from flagrs.results.swimming import Swimming, swimming_of
 from flagrs.scene import Head, Motor, Scene, Table, codec
 from flagrs.scene.rod_topology import edges_at_nodes, far_end
 from flagrs.scene.scene_checks import edges_of_head
-from flagrs.scene.values import FloatArray
+from flagrs.scene.values import FloatArray, IntArray
 from flagrs.trajectory_file import Contents
+
+if TYPE_CHECKING:
+    from flagrs.view import View
 
 
 class Trajectory:
@@ -67,7 +77,7 @@ class Trajectory:
         self.nodes = frames["nodes"]
         self.theta = frames["theta"]
         self.velocities = frames["velocities"]
-        self.force_density = frames["force_density"]
+        self.force_density = ForceDensity(frames["force_density"], immersed_edges(scene)[0])
         self.motor_angle = frames["motor_angle"]
         self.motor_speed = frames["motor_speed"]
         self.motor_torque = frames["motor_torque"]
@@ -316,6 +326,93 @@ class Trajectory:
         """Return the positions (T, n, 3) of the nodes of one rod [m]."""
         offset = self.scene.node_offset(rod)
         return self.nodes[:, offset : offset + len(self.scene.rods[rod].nodes)]
+
+    @property
+    def edges(self) -> IntArray:
+        """Start and end node (E, 2) of the edges."""
+        return edges_of(self.scene)
+
+    @property
+    def radius(self) -> FloatArray:
+        """Radius (E,) of the edges [m]."""
+        return np.concatenate([rod.radius_array() for rod in self.scene.rods])
+
+    def material_directors(self, frames: Any = None) -> FloatArray:
+        """Return the material director m1 (F, E, 3) of the edges.
+
+        Frames hold the angles of the directors against others that the simulation carries along in time;
+        those are found again from the nodes, to a fraction of a degree if the run ended in a checkpoint, as
+        runs do (`flagrs.results.material_frames`).
+
+        Parameters
+        ----------
+        frames
+            Indices (F,) of the frames, in increasing order; None: all.
+        """
+        chosen = np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64)
+        return directors(self.scene, self.time, self.nodes, self.theta, chosen, self._contents.state)
+
+    def swimming(self, start: float | None = None, end: float | None = None) -> Swimming:
+        """Return the swimming velocity with its uncertainty, in the laboratory and along the swimmer's axis.
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run. A `flagrs.StationarityWarning` says if the
+            velocity has a trend over it.
+
+        Raises
+        ------
+        FlagrsError
+            If fewer than nine frames lie in the window, or clamps hold filaments and there is no head.
+        """
+        found = swimming_of(self, start, end)
+        if not found.stationary:
+            warnings.warn(
+                f"the swimming velocity is not steady from {found.start:g} s to {found.end:g} s; "
+                "take a later window (start=), or run on",
+                StationarityWarning,
+                stacklevel=2,
+            )
+        return found
+
+    def readouts(self, start: float | None = None, end: float | None = None) -> ReadOuts:
+        """Return everything that is read off the run in single numbers, with units and errors; print it.
+
+        What means nothing for the scene is there without a value, and says why.
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run.
+
+        Raises
+        ------
+        FlagrsError
+            If fewer than two frames lie in the window.
+        """
+        return readouts_of(self, start, end)
+
+    def bundle(self, frames: Any = None) -> Bundle:
+        """Return the filaments, measured together: gaps, phases, tips, twist, writhe, linking.
+
+        Parameters
+        ----------
+        frames
+            Indices (F,) of the frames, in increasing order; None: all.
+
+        Raises
+        ------
+        FlagrsError
+            If the scene has no immersed filament.
+        """
+        return bundle_of(self, np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64))
+
+    def view(self, **options: Any) -> View:
+        """Return the run in three dimensions, for a notebook or a page to `save`; see `flagrs.view.view`."""
+        from flagrs.view import view  # views read trajectories, so they are above this module
+
+        return view(self, **options)
 
     def _global_node(self, part: Head | Motor, node: int) -> int:
         return self.scene.node_offset(part.rod) + node
