@@ -86,8 +86,7 @@ def velocity(
     at: _Floats,
     nodes: _Floats,
     edges: _Ints,
-    force_density: _Floats,
-    viscosity: float,
+    density: _Floats,
     epsilon: _Floats,
     threads: int,
 ) -> _Floats: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -117,7 +118,8 @@ def velocity(
     check_edges(force_density, pairs)
     mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
-    return _flagrs.velocity(at, sources, pairs, density, mu, widths, thread_count(threads))
+    scaled = density * (1.0 / (8.0 * math.pi * mu))
+    return _flagrs.velocity(at, sources, pairs, scaled, widths, thread_count(threads))
 
 
 class FastMobility:
