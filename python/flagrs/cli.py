@@ -14,6 +14,7 @@ from rich.table import Table as TextTable
 
 from flagrs import scenarios
 from flagrs.commands.measure import measure
+from flagrs.commands.movie import movie
 from flagrs.commands.plot import check_image, draw, plot
 from flagrs.commands.view import view
 from flagrs.errors import FlagrsError, SceneError
@@ -33,7 +34,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # it takes units in brackets for markup
 )
 
-for command in (plot, view, measure):
+for command in (plot, view, movie, measure):
     app.command()(command)
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.

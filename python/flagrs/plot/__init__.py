@@ -4,6 +4,7 @@ from flagrs.plot.bundling import bundle
 from flagrs.plot.curves import study
 from flagrs.plot.flow import flow
 from flagrs.plot.kymograph import curvature, tension
+from flagrs.plot.movie import movie
 from flagrs.plot.overview import summary
 from flagrs.plot.printed import printed
 from flagrs.plot.rates import speed
@@ -14,6 +15,7 @@ __all__ = [
     "bundle",
     "curvature",
     "flow",
+    "movie",
     "printed",
     "save_table",
     "shape",
