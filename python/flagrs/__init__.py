@@ -10,6 +10,7 @@ from flagrs.guards import (
     ReynoldsWarning,
     StabilityWarning,
     StationarityWarning,
+    StepWarning,
     StrainWarning,
 )
 from flagrs.scene import (
@@ -67,6 +68,7 @@ __all__ = [
     "Simulation",
     "StabilityWarning",
     "StationarityWarning",
+    "StepWarning",
     "StrainWarning",
     "Suggestion",
     "Table",

@@ -17,6 +17,7 @@ from flagrs.budget import EnergyBudget, budget_of
 from flagrs.errors import FileError, FlagrsError
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.fluid import hat_weights
+from flagrs.force_density import ForceDensity
 from flagrs.frame import shapes_of
 from flagrs.guards import Notice, StationarityWarning, notices
 from flagrs.measures import along, angle_about, slope, spin_about, window
@@ -76,7 +77,7 @@ class Trajectory:
         self.nodes = frames["nodes"]
         self.theta = frames["theta"]
         self.velocities = frames["velocities"]
-        self.force_density = frames["force_density"]
+        self.force_density = ForceDensity(frames["force_density"], immersed_edges(scene)[0])
         self.motor_angle = frames["motor_angle"]
         self.motor_speed = frames["motor_speed"]
         self.motor_torque = frames["motor_torque"]
