@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table as TextTable
 
 from flagrs import scenarios
+from flagrs.commands.export import export
 from flagrs.commands.measure import measure
 from flagrs.commands.movie import movie
 from flagrs.commands.plot import check_image, draw, plot
@@ -35,7 +36,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # it takes units in brackets for markup
 )
 
-for command in (plot, view, movie, measure):
+for command in (plot, view, movie, measure, export):
     app.command()(command)
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
