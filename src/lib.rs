@@ -16,10 +16,11 @@
 //! # The map
 //!
 //! * [`rod`]: networks, frames, strains; [`elastic`]: energies and motors; [`fluid`]: drag models and the head;
-//!   [`forces`]: loads and fields; [`kinematics`]: clamps; [`contact`]: distances and contact forces; [`dynamics`]: model, state, schemes, Newton; [`linear`]: matrices.
-//! * Imports run one way: `rod <- elastic, fluid, forces, kinematics, contact <- dynamics <- python`; `linear` knows nothing of rods.
+//!   [`forces`]: loads and fields; [`kinematics`]: clamps; [`contact`]: distances and contact forces; [`body`]: rigid bodies in the flow; [`dynamics`]: model, state, schemes, Newton; [`linear`]: matrices.
+//! * Imports run one way: `rod <- elastic, fluid, forces, kinematics, contact <- dynamics <- python`; `linear` and `body` know nothing of rods.
 //! * [`dynamics::simulation::Simulation`] is the way in.
 
+pub mod body;
 pub mod contact;
 pub mod dynamics;
 pub mod elastic;
