@@ -25,7 +25,7 @@ help:
 	@echo 'make fuzz        random scenes that no test has seen; EXAMPLES=100000 for as many, an hour or more'
 	@echo 'make coverage    lines of the Python package that its tests run; make coverage-rust those of the core'
 	@echo 'make figure      the picture of the robot in the README'
-	@echo 'make studies     the supplementary text'"'"'s studies: speed against rpm for meshes and geometries'
+	@echo 'make studies     the studies of Lim et al.: speed against rpm for meshes and geometries'
 	@echo 'make validation  every number and figure of docs/validation'
 	@echo 'make bench       every number of docs/performance.md'
 	@echo 'make wheel       the wheel, in dist/; make test-wheel tries it in an empty environment'

@@ -6,8 +6,6 @@ mod scenes;
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use flagrs::dynamics::scheme::Scheme;
-use flagrs::dynamics::simulation::Simulation;
 use flagrs::elastic::bending::Bending;
 use flagrs::elastic::hinges::Hinges;
 use flagrs::elastic::stretching::Stretching;
@@ -17,6 +15,8 @@ use flagrs::rod::assembly::{Assembly, HingeElement, Increment, Term};
 use flagrs::rod::configuration::Configuration;
 use flagrs::rod::network::Network;
 use flagrs::rod::reference::ReferenceFrames;
+use flagrs::simulation::Simulation;
+use flagrs::step::scheme::Scheme;
 
 /// The elastic terms of a helix with workspace of their own: a simulation evaluates them only together.
 struct Chain {

@@ -6,8 +6,8 @@ mod scenes;
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use flagrs::dynamics::threads;
 use flagrs::fluid::stokeslet::mobility;
+use flagrs::runtime::threads;
 
 fn assembly(criterion: &mut Criterion) {
     let available = threads::thread_count(None);

@@ -6,11 +6,11 @@ mod scenes;
 use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, SamplingMode};
-use flagrs::dynamics::scheme::Scheme;
-use flagrs::dynamics::simulation::Simulation;
-use flagrs::dynamics::specification::Specification;
-use flagrs::dynamics::state::State;
-use flagrs::dynamics::statistics::Statistics;
+use flagrs::model::specification::Specification;
+use flagrs::simulation::Simulation;
+use flagrs::state::State;
+use flagrs::step::scheme::Scheme;
+use flagrs::step::statistics::Statistics;
 
 /// Simulated time before the state all schemes start from, s: any, and long after the clamped flagella first touch, at
 /// about 4 s.

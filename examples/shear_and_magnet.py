@@ -37,9 +37,7 @@ for share in (0.8, 1.2):
         return (-1e-3 * np.sin(omega * time), 1e-3 * np.cos(omega * time), 0.0)
 
     scene = flagrs.Scene(rods=magnetic, fluid=oil, magnetic_field=flagrs.MagneticField(field=field))
-    trajectory = flagrs.Simulation(scene, rtol=1e-3).run(
-        until=200.0 / omega, save_every=0.2 / omega, path=False
-    )
+    trajectory = flagrs.Simulation(scene).run(until=200.0 / omega, save_every=0.2 / omega, path=False)
     turns = angle(trajectory)
     rate = (turns[-1] - turns[0]) / (200.0 / omega)
     expected = omega if share < 1.0 else omega - np.sqrt(omega**2 - limit**2)

@@ -18,7 +18,7 @@ def trap(time, nodes, velocities, directors):
     return {"forces": forces, "stiffness": stiffness}
 
 
-simulation = flagrs.Simulation(scene, rtol=1e-3, force=trap)
+simulation = flagrs.Simulation(scene, force=trap)
 trajectory = simulation.run(until=5.0, save_every=0.5, path=False)
 behind = 2e-3 * 5.0 - (trajectory.nodes[-1, -1, 1] - rod.nodes[-1, 1])
 print(f"the end follows the trap {1e3 * behind:.2f} mm behind it, pulled by {1e6 * SPRING * behind:.2f} uN")

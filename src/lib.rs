@@ -15,22 +15,36 @@
 //!
 //! # The map
 //!
-//! * [`rod`]: networks, frames, strains; [`elastic`]: energies and motors; [`fluid`]: drag models and the head;
-//!   [`forces`]: loads and fields; [`kinematics`]: clamps; [`contact`]: distances and contact forces; [`body`]: rigid bodies in the flow; [`dynamics`]: model, state, schemes, Newton; [`linear`]: matrices.
-//! * Imports run one way: `rod <- elastic, fluid, forces, kinematics, contact <- dynamics <- python`; `linear` and `body` know nothing of rods.
-//! * [`dynamics::simulation::Simulation`] is the way in.
+//! * Know nothing of rods: [`linear`], matrices; [`nonlinear`], Newton's method; [`bdf`], backward differences; [`signal`], functions of
+//!   time; [`runtime`], threads and Ctrl-C.
+//! * What acts on a filament: [`rod`], networks, frames, strains; [`kinematics`], clamps; [`elastic`], energies; [`forces`], motors, loads and
+//!   fields; [`fluid`], drag models and the head; [`contact`], distances and contact forces;
+//!   [`body`], rigid bodies in the flow.
+//! * What moves it: [`model`], the constant part of a scene; [`state`], the changing one; [`inputs`], what drives; [`step`], the equations of
+//!   one step; [`simulation`], step after step.
+//! * Imports run one way: `linear, nonlinear, bdf, signal, runtime <- rod, kinematics <- elastic, forces, fluid, contact, body <- model <- state <- step <-
+//!   simulation <- python`.
+//! * [`simulation::Simulation`] is the way in.
 
+pub mod bdf;
 pub mod body;
 pub mod contact;
-pub mod dynamics;
 pub mod elastic;
 pub mod fluid;
 pub mod forces;
+pub mod inputs;
 pub mod kinematics;
 pub mod linear;
+pub mod model;
+pub mod nonlinear;
 #[cfg(feature = "python")]
 mod python;
 pub mod rod;
+pub mod runtime;
+pub mod signal;
+pub mod simulation;
+pub mod state;
+pub mod step;
 
 /// A point or vector in space.
 pub type Vec3 = nalgebra::Vector3<f64>;

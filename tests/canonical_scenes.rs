@@ -4,9 +4,9 @@
 mod scenes;
 
 use flagrs::Vec3;
-use flagrs::dynamics::scheme::Scheme;
-use flagrs::dynamics::simulation::Simulation;
-use flagrs::dynamics::specification::Specification;
+use flagrs::model::specification::Specification;
+use flagrs::simulation::Simulation;
+use flagrs::step::scheme::Scheme;
 
 fn edge_lengths(scene: &Specification) -> Vec<f64> {
     scene.edges.iter().map(|&[i, j]| (scene.nodes[j] - scene.nodes[i]).norm()).collect()

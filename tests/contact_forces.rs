@@ -5,13 +5,13 @@ mod common;
 use common::{Random, chain_edges, chain_hinges, scene};
 use flagrs::Vec3;
 use flagrs::contact::spillmann::{ContactLaw, ContactSolver};
-use flagrs::dynamics::scheme::Scheme;
-use flagrs::dynamics::simulation::Simulation;
-use flagrs::dynamics::specification::{
+use flagrs::kinematics::clamp::Motion;
+use flagrs::model::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
     LoadSpecification, Specification,
 };
-use flagrs::kinematics::clamp::Motion;
+use flagrs::simulation::Simulation;
+use flagrs::step::scheme::Scheme;
 
 const TOLERANCE: f64 = 1e-3;
 

@@ -4,10 +4,10 @@ mod common;
 
 use common::{Random, scene};
 use flagrs::Vec3;
-use flagrs::dynamics::scheme::Scheme;
-use flagrs::dynamics::simulation::Simulation;
-use flagrs::dynamics::specification::{MotorSpecification, Specification};
-use flagrs::elastic::signal::Signal;
+use flagrs::model::specification::{MotorSpecification, Specification};
+use flagrs::signal::Signal;
+use flagrs::simulation::Simulation;
+use flagrs::step::scheme::Scheme;
 
 /// A chain with two motors, a section that is not round, natural curvature and twist, and two branches, one of whose
 /// edges runs against its hinges.

@@ -7,12 +7,12 @@ mod scenes;
 
 use common::{chain_edges, chain_hinges, scene};
 use flagrs::Vec3;
-use flagrs::dynamics::filaments::Filament;
-use flagrs::dynamics::model::Model;
-use flagrs::dynamics::scheme::Scheme;
-use flagrs::dynamics::simulation::Simulation;
-use flagrs::dynamics::specification::{ClampSpecification, FluidModelSpecification, FluidSpecification, Specification};
 use flagrs::kinematics::clamp::Motion;
+use flagrs::model::Model;
+use flagrs::model::filaments::Filament;
+use flagrs::model::specification::{ClampSpecification, FluidModelSpecification, FluidSpecification, Specification};
+use flagrs::simulation::Simulation;
+use flagrs::step::scheme::Scheme;
 
 fn filaments(specification: Specification) -> (Vec<usize>, Vec<Filament>) {
     let (model, _) = Model::new(specification).expect("the scene is valid");

@@ -3,7 +3,6 @@
 mod common;
 
 use common::Random;
-use flagrs::elastic::signal::Signal;
 use flagrs::forces::edge_vector::{EdgeVector, edge_dofs};
 use flagrs::forces::follower::{FollowerForce, FollowerTorque};
 use flagrs::forces::inputs::{Inputs, VectorChannels};
@@ -14,6 +13,7 @@ use flagrs::rod::assembly::{Assembly, Increment, Term};
 use flagrs::rod::configuration::Configuration;
 use flagrs::rod::network::Network;
 use flagrs::rod::reference::ReferenceFrames;
+use flagrs::signal::Signal;
 use flagrs::{Mat3, Vec3};
 
 /// Two edges, frames of a reference shape, and degrees of freedom away from it.

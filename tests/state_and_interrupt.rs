@@ -6,10 +6,10 @@ mod scenes;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use flagrs::dynamics::failure::StepError;
-use flagrs::dynamics::scheme::Scheme;
-use flagrs::dynamics::simulation::Simulation;
-use flagrs::dynamics::state::State;
+use flagrs::simulation::Simulation;
+use flagrs::simulation::failure::StepError;
+use flagrs::state::State;
+use flagrs::step::scheme::Scheme;
 
 /// Makes a field wrong.
 type Spoil = fn(&mut State);

@@ -4,14 +4,15 @@ mod common;
 
 use common::{Random, chain_edges, chain_hinges, scene};
 use flagrs::Vec3;
-use flagrs::dynamics::model::Model;
-use flagrs::dynamics::state::State;
-use flagrs::dynamics::terms::{Inertia, Loads};
 use flagrs::fluid::twist_drag::TwistDrag;
+use flagrs::forces::inertia::Inertia;
+use flagrs::forces::weight::Weight;
 use flagrs::linear::pattern::Pattern;
+use flagrs::model::Model;
 use flagrs::rod::assembly::{Assembly, Increment, Term};
 use flagrs::rod::configuration::{Configuration, node};
 use flagrs::rod::network::Network;
+use flagrs::state::State;
 
 const NODES: usize = 5;
 
@@ -132,7 +133,7 @@ fn loads_push_the_way_they_point() {
     let step = Step::new(3);
     let forces: Vec<f64> = (0..step.after.len()).map(|k| k as f64 - 4.0).collect();
     // The residual is what the other terms must balance: minus the force.
-    let residual = step.residual(&Loads::new(forces.clone()), &step.after);
+    let residual = step.residual(&Weight::new(forces.clone()), &step.after);
     assert!(residual.iter().zip(&forces).all(|(residual, force)| *residual == -force));
 }
 

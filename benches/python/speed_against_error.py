@@ -183,7 +183,7 @@ def mesh_and_fluid() -> str:
     """Return what mesh, regularization and fluid model are worth on the robot."""
     edges = (9e-3, 7e-3, 5e-3, 3.5e-3, 2.5e-3)
     models: dict[str, dict[str, Any]] = {
-        "seed's epsilon": {},
+        "Lim et al.'s epsilon": {},
         "epsilon = sqrt(e) a": {"fluid": {"epsilon": "slender"}},
         "no twist drag": {"twist_drag": False},
         "RFT, Gray-Hancock": {"fluid": {"model": "RFT"}},
@@ -200,8 +200,8 @@ def mesh_and_fluid() -> str:
     head = ("robot at 20 rpm", "nodes", "ms per simulated s", "speed [mm/s]", "head [rad/s]", "torque [uN m]")
     note = (
         "The last three columns compare speed, head rate and torque: of a mesh with the same model's limit "
-        "for edges to zero (extrapolated from 5 and 2.5 mm), and of a model's limit with that of the seed's "
-        "epsilon."
+        "for edges to zero (extrapolated from 5 and 2.5 mm), and of a model's limit with that of "
+        "Lim et al.'s epsilon."
     )
     return f"{table((*head, 'speed', 'head', 'torque'), rows)}\n\n{note}"
 

@@ -1,7 +1,7 @@
 """Regularized Stokeslet segments in NumPy and Numba: the published closed forms, written down as they stand.
 
 Both return the matrix A (3N, 3N) of ``8 pi mu u = A f`` for a chain: Cortez (2018),
-doi:10.1016/j.jcp.2018.08.055, or equations 12 to 14 of the supplementary text, 14e mended. With
+doi:10.1016/j.jcp.2018.08.055, or equations 12 to 14 of Lim et al., 14e mended. With
 ``r = x - x_k``, ``s = x_k - x_(k+1)``, ``p = (r + a s) . s`` and ``R^2 = |r + a s|^2 + eps^2`` everything
 follows from ``log(|s| R + p)`` and ``1/(R (|s| R + p))`` at a = 0 and 1.
 """

@@ -1,6 +1,6 @@
 """The picture of the swimming robot in the README: what `make figure` runs.
 
-The robot of the supplementary text, pitch 7, swims for 100 s at 20 rpm on a mesh of 2.5 mm. Drawn are its
+The robot of Lim et al., pitch 7, swims for 100 s at 20 rpm on a mesh of 2.5 mm. Drawn are its
 shape at four instants, flagella as thick as they are, and its speed and the head's rotation over time.
 """
 

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 FIGURES = Path(__file__).with_name("figures")
-#: Regularization over radius in the supplementary text.
-SEED = 1.65 / 1.6
+#: Regularization over radius in Lim et al.
+LIM_ET_AL = 1.65 / 1.6
 
 
 # ---------------------------------------------------------------------------------------------------
@@ -197,12 +197,12 @@ def study_straight() -> None:
 
     rows = []
     for length, count in ((80.0, 25), (100.0, 50), (200.0, 50), (200.0, 100), (400.0, 100), (400.0, 200)):
-        rod = straight(length, count, SEED)
+        rod = straight(length, count, LIM_ET_AL)
         cells = []
         for axis in (0, 1):
             lumped = rod.density(np.tile(np.eye(3)[axis], (count + 1, 1)))[:, axis].sum() * length / count
             cells.append(percent(lumped / rod.drag(axis) - 1.0, 1))
-        rows.append([f"{length:g}", count, f"{length / count / SEED:.2f}", *cells])
+        rows.append([f"{length:g}", count, f"{length / count / LIM_ET_AL:.2f}", *cells])
     table(
         "straight rod, nodal force |e| f in place of W f",
         ["L/a", "edges", "|e|/eps", "along", "across"],
@@ -231,13 +231,13 @@ def study_straight() -> None:
 
 def study_helix() -> None:
     """Thrust, drag and torque of rigid helices."""
-    seed = Helix()
+    flagellum = Helix()
     sphere = surface_solution(straight_tube(0.0, 0), 0.8, 12).drag / (6.0 * math.pi) - 1.0
     print(f"\nsurface solution of a sphere, error of the drag: {percent(sphere, 3)}")
     fits = ((1.0, 6), (0.8, 8), (0.8, 12))
-    references = [surface_solution(helix_tube(seed), step, around) for step, around in fits]
+    references = [surface_solution(helix_tube(flagellum), step, around) for step, around in fits]
     exact = references[-1]
-    spin = seed.twist_torque
+    spin = flagellum.twist_torque
     columns = ["", "drag [N s/m]", "thrust [mN s]", "torque [uN m s]", "thrust from translation [mN s]"]
 
     def row(name: str, p: Propulsion, compare: bool = True) -> list[str]:
@@ -249,40 +249,42 @@ def study_helix() -> None:
     rows = [
         row(f"surface, {step} a, {k} around", p, False) for (step, k), p in zip(fits, references, strict=True)
     ]
-    for name, ratio in (("slender", SLENDER), ("seed", SEED)):
+    for name, ratio in (("slender", SLENDER), ("lim-et-al", LIM_ET_AL)):
         for count in (25, 48):
-            filament = seed.filament(count, ratio)
+            filament = flagellum.filament(count, ratio)
             rows.append(row(f"segments, eps {name}, {count} edges, twist drag", of_filament(filament, spin)))
             rows.append(row(f"segments, eps {name}, {count} edges", of_filament(filament)))
-    arc = seed.pitch / seed.advance
-    for coefficients, wavelength in (("gray-hancock", seed.pitch), ("lighthill", arc)):
+    arc = flagellum.pitch / flagellum.advance
+    for coefficients, wavelength in (("gray-hancock", flagellum.pitch), ("lighthill", arc)):
         rows.append(
             row(
                 f"{coefficients}, 200 edges",
-                of_model(seed, 200, model="RFT", coefficients=coefficients, wavelength=wavelength),
+                of_model(flagellum, 200, model="RFT", coefficients=coefficients, wavelength=wavelength),
             )
         )
-    table("the seed's helix, pitch/R = 7", columns, rows)
+    table("Lim et al.'s helix, pitch/R = 7", columns, rows)
     twist = []
     for pitch in (5.0, 7.0, 9.0):
         helix = Helix(pitch=pitch * Helix.radius)
         counts = (int(helix.contour / 5e-3), int(helix.contour / (SLENDER * helix.thickness)))
         shares = [
             helix.twist_torque / of_filament(helix.filament(n, r)).torque
-            for r in (SEED, SLENDER)
+            for r in (LIM_ET_AL, SLENDER)
             for n in counts
         ]
         twist.append([f"{pitch:g}", f"{counts[0]}, {counts[1]}", *(percent(share, 1) for share in shares)])
-    heads = ["pitch/R", "edges", "eps seed, 5 mm", "fine", "eps slender, 5 mm", "fine"]
+    heads = ["pitch/R", "edges", "eps of Lim et al., 5 mm", "fine", "eps slender, 5 mm", "fine"]
     table("twist drag over the Stokeslets' torque", heads, twist)
 
     rows = []
     for count in (12, 25, 48):
-        filament = seed.filament(count, SEED)
+        filament = flagellum.filament(count, LIM_ET_AL)
         edge = float(np.linalg.norm(filament.nodes[1] - filament.nodes[0]))
         lumped = propulsion(filament.nodes, lambda velocity, one=filament, e=edge: e * one.density(velocity))
         rows.append([count, *(percent(d, 1) for d in lumped.over(of_filament(filament)))])
-    table("the seed's helix, nodal force |e| f in place of W f", ["edges", "drag", "thrust", "torque"], rows)
+    table(
+        "Lim et al.'s helix, nodal force |e| f in place of W f", ["edges", "drag", "thrust", "torque"], rows
+    )
 
     # The finest fits that a gigabyte and half a minute allow.
     fitted = {1.6e-3: (0.8, 12), 0.8e-3: (0.8, 8), 0.4e-3: (1.0, 8)}
@@ -320,13 +322,13 @@ def study_helix() -> None:
     left, right = figure.subplots(1, 2)
     for k, name in ((0, "drag"), (2, "torque")):
         left.loglog(
-            [r / seed.radius for r in fitted],
+            [r / flagellum.radius for r in fitted],
             [abs(d[k]) for d in differences],
             "o-",
             color=COLOURS[k],
             label=name,
         )
-    plain_ticks(left.xaxis, [round(r / seed.radius, 3) for r in fitted])
+    plain_ticks(left.xaxis, [round(r / flagellum.radius, 3) for r in fitted])
     left.set_ylim(1e-3, 1e-1)
     dress(left, "a/R", "relative difference", "one turn, against the surface solution")
     legend(left)
@@ -349,11 +351,11 @@ def study_helix() -> None:
 def study_matrix() -> None:
     """Condition, oscillation and asymmetry against the ratio of edge length to regularization."""
     ratios = [8.0, 4.0, 2.0, 1.5, 1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2]
-    seed = Helix()
+    flagellum = Helix()
     rows, found = [], []
     for ratio in ratios:
         rod = straight(60.0, round(60.0 / ratio), 1.0)
-        helix = seed.filament(max(8, round(seed.contour / (ratio * SLENDER * seed.thickness))))
+        helix = flagellum.filament(max(8, round(flagellum.contour / (ratio * SLENDER * flagellum.thickness))))
         density = rod.density(np.tile([0.0, 1.0, 0.0], (len(rod.nodes), 1)))[:, 1]
         values = (
             condition(rod),
@@ -377,7 +379,7 @@ def study_matrix() -> None:
             "|e|/eps",
             "edges of the rod",
             "cond, rod",
-            "cond, seed's helix",
+            "cond, Lim et al.'s helix",
             "zigzag gain",
             "highest density",
             "lowest density",
@@ -390,7 +392,7 @@ def study_matrix() -> None:
     left, right = figure.subplots(1, 2)
     columns = np.array(found)
     left.loglog(ratios, columns[:, 0], "o-", color=COLOURS[0], label="straight rod, L = 60 eps")
-    left.loglog(ratios, columns[:, 1], "s-", color=COLOURS[1], label="seed's helix")
+    left.loglog(ratios, columns[:, 1], "s-", color=COLOURS[1], label="Lim et al.'s helix")
     short = np.array(ratios)[np.array(ratios) <= 1.0]
     left.loglog(
         short, 6.0 * np.exp(math.pi / short), "--", color="grey", label=r"$\propto e^{\pi\epsilon/|e|}$"

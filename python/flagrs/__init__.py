@@ -9,6 +9,7 @@ from flagrs.guards import (
     MeshWarning,
     ReynoldsWarning,
     StabilityWarning,
+    StepWarning,
     StrainWarning,
 )
 from flagrs.scene import (
@@ -65,6 +66,7 @@ __all__ = [
     "SceneError",
     "Simulation",
     "StabilityWarning",
+    "StepWarning",
     "StrainWarning",
     "Suggestion",
     "Table",

@@ -8,9 +8,11 @@ import numpy as np
 
 from flagrs.scene.values import FloatArray
 
-#: What gives energy, and what takes it, in the order of the native account (src/dynamics/budget.rs).
+#: What gives energy, and what takes it, in the order of the native account (src/step/budget.rs).
 SOURCES = ("motors", "clamps", "loads", "gravity")
 SINKS = ("fluid", "twist_drag", "head", "contact", "other")
+#: Those of them that only ever take: the first ones.
+DRAGS = SINKS[:3]
 #: What stores it.
 STORES = ("elastic", "contact", "kinetic")
 #: Length of an account.
@@ -59,7 +61,7 @@ def budget_of(accounts: FloatArray) -> EnergyBudget:
     begun = accounts[:, 23] > 0.0
     change = np.where(begun, stored.sum(axis=1) - accounts[:, 22], 0.0)
     defect = given.sum(axis=1) - taken.sum(axis=1) - change
-    passed = np.maximum.reduce([np.abs(given).sum(axis=1), np.abs(taken).sum(axis=1), accounts[:, 24]])
+    passed = _passed(accounts)
     parts = dict(zip(STORES, stored.T, strict=True)) | {"total": change}
     relative = np.divide(defect, passed, out=np.zeros_like(defect), where=passed > 0.0)
     return EnergyBudget(
@@ -70,6 +72,24 @@ def budget_of(accounts: FloatArray) -> EnergyBudget:
         defect=defect,
         relative_defect=relative,
     )
+
+
+def _passed(accounts: FloatArray) -> FloatArray:
+    """Return the energy (T,) that has passed: the larger of what was given, taken, and ever stored [J]."""
+    through = np.abs(accounts[:, 1:10])
+    given, taken = through[:, : len(SOURCES)].sum(axis=1), through[:, len(SOURCES) :].sum(axis=1)
+    passed: FloatArray = np.maximum.reduce([given, taken, accounts[:, 24]])
+    return passed
+
+
+def given_by_drag(account: FloatArray) -> float:
+    """Return the energy that fluid, twist drag and head have given in an account (42,), over that passed.
+
+    Drag takes. Where it has given on the whole, as by the forces of velocities long gone, steps are unstable.
+    """
+    first = 1 + len(SOURCES)
+    taken, passed = account[first : first + len(DRAGS)], float(_passed(account[None])[0])
+    return float(-taken[taken < 0.0].sum()) / passed if passed > 0.0 else 0.0
 
 
 def statistics_of(account: FloatArray) -> dict[str, float]:

@@ -13,10 +13,12 @@ from rich.console import Console
 from rich.table import Table as TextTable
 
 from flagrs import scenarios
+from flagrs.commands.view import view
 from flagrs.errors import FileError, FlagrsError, SceneError, file_error, not_allowed
 from flagrs.progress import ProgressBar
 from flagrs.runs import Run, RunSettings, measured, run_to_file
 from flagrs.scene import Scene, toml
+from flagrs.step_choice import steps_in_words
 from flagrs.suggest import suggest
 from flagrs.trajectory import Trajectory
 from flagrs.units import rpm
@@ -29,6 +31,8 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,  # it takes units in brackets for markup
 )
+
+app.command()(view)
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
 BAD_INPUT, FAILED = 2, 1
@@ -68,8 +72,10 @@ def run(
     until: Annotated[float, typer.Option(help="Simulated time to run to [s].")] = 10.0,
     save_every: Annotated[float, typer.Option(help="Simulated time between frames [s].")] = 0.1,
     scheme: Annotated[str, typer.Option(help="Scheme in time.")] = "overdamped",
-    dt: Annotated[float | None, typer.Option(help="Time step [s].")] = None,
-    rtol: Annotated[float | None, typer.Option(help="Relative error of adaptive steps.")] = None,
+    dt: Annotated[float | None, typer.Option(help="Length of fixed steps [s].")] = None,
+    rtol: Annotated[
+        float | None, typer.Option(help="Relative error of adaptive steps; 1e-3 unless --dt is given.")
+    ] = None,
     threads: Annotated[int | None, typer.Option(help="Threads; else FLAGRS_THREADS.")] = None,
     changes: Annotated[
         list[str] | None,
@@ -86,7 +92,12 @@ def run(
         return
     path = output or Path(f"{described.name}.h5")
     settings = RunSettings(
-        until=until, save_every=save_every, scheme=scheme, dt=dt, rtol=rtol, threads=threads
+        until=until,
+        save_every=save_every,
+        scheme=scheme,
+        dt=dt,
+        rtol="auto" if rtol is None else rtol,
+        threads=threads,
     )
     for warning in described.plan().warnings:
         typer.echo(f"warning: {warning}", err=True)
@@ -134,7 +145,7 @@ def study(
         Path | None, typer.Option("-o", "--output", help="Folder for runs and results.")
     ] = None,
     duration: Annotated[float, typer.Option(help="Simulated time of each run [s].")] = 100.0,
-    dt: Annotated[float | None, typer.Option(help="Time step [s].")] = None,
+    dt: Annotated[float | None, typer.Option(help="Length of fixed steps [s].")] = None,
     rtol: Annotated[
         float | None, typer.Option(help="Relative error of adaptive steps; 1e-3 unless --dt is given.")
     ] = None,
@@ -143,16 +154,15 @@ def study(
         int | None, typer.Option(help="Worker processes; by default one per processor.")
     ] = None,
 ) -> None:
-    """Repeat a study of the supplementary text: speed against rpm, for meshes or for geometries."""
+    """Repeat a study of Lim et al.: speed against rpm, for meshes or for geometries."""
     from flagrs import study as studies  # the other commands do without
 
     carry_out = studies.convergence if which == "convergence" else studies.geometries
-    adaptive = dt is None and scheme != "explicit"
     try:
         result = carry_out(
             directory or Path("flagrs-runs") / which,
             duration=duration,
-            rtol=1e-3 if rtol is None and adaptive else rtol,
+            rtol="auto" if rtol is None else rtol,
             dt=dt,
             scheme=scheme,
             processes=processes,
@@ -258,6 +268,8 @@ def _report(done: Run, path: Path) -> str:
     wall = trajectory.wall_seconds
     factor = f", {simulated / wall:.3g} times real time" if wall > 0.0 else ""
     lines.append(f"wall time         {wall:.3g} s for {simulated:g} s simulated{factor}")
+    steps, given = trajectory.settings["rtol"], trajectory.settings["dt"]
+    lines.append(f"steps             {steps_in_words(steps, given)}")
     lines.append(f"saved             {path} ({len(trajectory)} frames)")
     return "\n".join(lines)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from flagrs import _flagrs
 from flagrs.errors import SceneError
+from flagrs.force_density import check_edges
 from flagrs.memory import require_memory
 from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
@@ -100,7 +101,8 @@ def velocity(
     Raises
     ------
     SceneError
-        As `mobility`, and for a viscosity that is not positive.
+        As `mobility`, for a viscosity that is not positive, and for edges that are not among the immersed
+        ones of a density which a simulation or trajectory gave.
 
     Examples
     --------
@@ -112,6 +114,7 @@ def velocity(
     density = _vectors("force_density", force_density)
     if density.shape != sources.shape:
         raise _wrong("force_density", f"shape {density.shape}", f"of shape {sources.shape}")
+    check_edges(force_density, pairs)
     mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
     return _flagrs.velocity(at, sources, pairs, density, mu, widths, thread_count(threads))
@@ -166,11 +169,14 @@ class FastMobility:
         points, pairs, widths = _segments(nodes, edges, epsilon)
         at = None if targets is None else _vectors("targets", targets)
         largest = number("error", error, Bounds("1", at_least=1e-9, at_most=0.1))
+        self._edges = pairs
         self._native = _flagrs.FastMobility(points, pairs, widths, at, largest, thread_count(threads))
 
     def apply(self, force_density: Any) -> FloatArray:
         """Return ``8 pi mu u`` (M, 3) [N/m] for the force density (N, 3) [N/m] at the nodes."""
-        return self._native.apply(_vectors("force_density", force_density))
+        density = _vectors("force_density", force_density)
+        check_edges(force_density, self._edges)
+        return self._native.apply(density)
 
     def update(self, nodes: Any, targets: Any = None) -> None:
         """Move to other positions (N, 3) [m] of the nodes, and of the targets (M, 3) if there are any."""
@@ -193,6 +199,7 @@ def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:
     density = _vectors("force_density", force_density)
     if density.shape != points.shape:
         raise _wrong("force_density", f"shape {density.shape}", f"of shape {points.shape}")
+    check_edges(force_density, pairs)
     return _flagrs.hat_weights(points, pairs, density)
 
 

@@ -14,10 +14,8 @@ from flagrs.scene import Scene
 from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds
 from flagrs.simulation import Simulation
+from flagrs.step_choice import RelativeError, chosen_rtol
 from flagrs.trajectory import Trajectory
-
-#: Settings that change the result: a file made with other ones than those asked for is another run.
-_TELLING = ("scheme", "dt", "rtol")
 
 
 @dataclass(frozen=True)
@@ -33,9 +31,9 @@ class RunSettings:
     scheme : str
         Scheme in time; see `flagrs.Simulation`.
     dt : float or None
-        Time step [s]; None leaves it to the scheme.
-    rtol : float or None
-        Tolerance of the solver; None leaves it to the scheme.
+        Length of fixed steps [s]; see `flagrs.Simulation`.
+    rtol : float, "auto" or None
+        Relative error of adaptive steps; see `flagrs.Simulation`.
     threads : int or None
         Threads of the simulation; None leaves it to ``FLAGRS_THREADS``.
     """
@@ -44,14 +42,15 @@ class RunSettings:
     save_every: float = 0.1
     scheme: str = "overdamped"
     dt: float | None = None
-    rtol: float | None = None
+    rtol: RelativeError = "auto"
     threads: int | None = None
 
     def __post_init__(self) -> None:
-        """Raise SceneError for times that are not positive."""
+        """Raise SceneError for times that are not positive, and an error that no steps can keep to."""
         for name in ("until", "save_every", "dt"):
             if getattr(self, name) is not None:
                 number(name, getattr(self, name), Bounds("s", above=0.0))
+        chosen_rtol(self.rtol, self.dt, self.scheme)
 
 
 @dataclass(frozen=True)
@@ -126,14 +125,24 @@ def _existing(scene: Scene, path: Path, settings: RunSettings) -> Trajectory:
         raise FlagrsError(
             f"{path}: holds a run of another scene; choose another file, or start anew (--fresh)"
         )
-    for name in _TELLING:
-        wanted, found = getattr(settings, name), trajectory.settings[name]
-        if wanted is not None and wanted != found:
+    for name, wanted in _asked_for(settings).items():
+        found = trajectory.settings[name]
+        if wanted != found:
             raise FlagrsError(
                 f"{path}: holds a run with {name} = {found}, not {wanted}; "
                 "choose another file, or start anew (--fresh)"
             )
     return trajectory
+
+
+def _asked_for(settings: RunSettings) -> dict[str, str | float | None]:
+    """Return the settings that change the result: a file made with others is another run."""
+    asked: dict[str, str | float | None] = {"scheme": settings.scheme}
+    if settings.dt is not None:
+        asked["dt"] = settings.dt
+    if settings.dt is not None or settings.rtol != "auto":
+        asked["rtol"] = chosen_rtol(settings.rtol, settings.dt, settings.scheme)
+    return asked
 
 
 def _reached(trajectory: Trajectory, until: float) -> bool:

@@ -11,26 +11,27 @@ from typing import Any, Literal, Never, Self, cast
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse
 
 from flagrs import _flagrs
-from flagrs.assemble import edges_of, native_scene
+from flagrs.assemble import native_scene
 from flagrs.budget import statistics_of
 from flagrs.default_step import default_step
-from flagrs.errors import FileError, FlagrsError, SceneError, not_allowed
+from flagrs.errors import FileError, FlagrsError, not_allowed
 from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
-from flagrs.flow import flow_of, immersed_edges
 from flagrs.frame_times import check_frames, frame_times
-from flagrs.guards import Guards, Notice, StabilityWarning, check_contact
+from flagrs.guards import Guards, Notice, StabilityWarning, check_contact, check_turn
 from flagrs.memory import require_memory
 from flagrs.outside_force import ForceFunction, OutsideForce
 from flagrs.progress import bar_for
+from flagrs.read_outs import ReadOuts
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
 from flagrs.scene.scene import check_scene
 from flagrs.scene.shapes import number, whole
-from flagrs.scene.values import Bounds, FloatArray, IntArray
+from flagrs.scene.values import Bounds
+from flagrs.simulation_input import check_scheme, real_array, state_part
+from flagrs.step_choice import RelativeError, chosen_rtol, steps_in_words
 from flagrs.threads import thread_count
 from flagrs.time_step import (
     STABLE_SHARE,
@@ -38,9 +39,6 @@ from flagrs.time_step import (
     local_tolerance,
 )
 from flagrs.trajectory import Trajectory
-
-#: Schemes in time; see docs/theory/time.md.
-SCHEMES = ("overdamped", "implicit", "explicit")
 
 #: Where runs are saved when no path is given.
 RUNS_FOLDER = Path("flagrs-runs")
@@ -52,7 +50,7 @@ MOST_STEPS = 2**62
 CHECKPOINT_FRAMES = 20
 
 
-class Simulation:
+class Simulation(ReadOuts):
     """A scene set in motion.
 
     Parameters
@@ -61,17 +59,18 @@ class Simulation:
         What is simulated.
     scheme
         ``overdamped``: no inertia, fluid and elasticity implicit, first order, the default; ``implicit``:
-        the same with inertia; ``explicit``: the supplementary text's scheme, with the fluid forces of the
+        the same with inertia; ``explicit``: Lim et al.'s scheme, with the fluid forces of the
         last velocities, stable only for small steps (docs/theory/time.md).
     dt
-        Length of a step [s]. None: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
+        Length of fixed steps of first order [s]; given together with `rtol`, the scale of the first adaptive
+        step. None, for fixed steps: `flagrs.default_step.default_step`, a turn of 0.05 rad of the fastest
         motor or less where filaments relax faster; a fifth of the stability limit for the explicit scheme,
         which warns (`flagrs.StabilityWarning`) of longer ones than that limit.
     rtol
         Relative error to keep to by steps of adaptive size and of order one to three, 1e-8 to 0.1: the error
-        of node positions, relative to the size of the filament they are on (docs/theory/time.md). None:
-        steps of `dt`, first order. Not for the explicit scheme. With `rtol`, `dt` is the scale of the first
-        step.
+        of node positions, relative to the size of the filament they are on (docs/theory/time.md). ``auto``,
+        the default: 1e-3, but fixed steps if `dt` is given or the scheme is the explicit one, which has no
+        others. None: fixed steps.
     force
         A function that gives forces from outside, called once at the beginning of every step with the time
         [s], nodes (N, 3) [m], velocities (N, 3) [m/s] and directors (E, 3, 3), rows ``m1, m2, t``. It returns
@@ -101,7 +100,7 @@ class Simulation:
         scene: Scene,
         scheme: str = "overdamped",
         dt: float | None = None,
-        rtol: float | None = None,
+        rtol: RelativeError = "auto",
         force: ForceFunction | None = None,
         threads: int | None = None,
     ) -> None:
@@ -111,18 +110,10 @@ class Simulation:
             scene.plan().memory,
             "take longer edges, or leave Fluid.far_field_nodes as it is",
         )
-        if rtol is not None:
-            number("rtol", rtol, Bounds("1", at_least=1e-8, at_most=0.1))
-        if rtol is not None and scheme == "explicit":
-            raise SceneError(
-                f"rtol: {rtol} is not allowed with the explicit scheme; must be None",
-                field="rtol",
-                value=rtol,
-                allowed="None with the explicit scheme",
-            )
         step = default_step(scene) if dt is None else number("dt", dt, Bounds("s", above=0.0))
-        _check_scheme(scene, scheme)
+        check_scheme(scene, scheme)
         check_contact(scene)
+        rtol = chosen_rtol(rtol, dt, scheme)
         self._scene = scene
         native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
         self._exclusive = Exclusive(native, "the simulation")
@@ -134,6 +125,7 @@ class Simulation:
             "threads": threads,
             "force": None if force is None else repr(force),
         }
+        self._force = force
         self._guards = Guards(scene)
         self._restored: Path | None = None
         if force is not None:
@@ -142,6 +134,8 @@ class Simulation:
             self._native.set_tolerance(local_tolerance(scene, rtol))
         if scheme == "explicit" and dt is None:
             self._native.dt = STABLE_SHARE * min(self.stable_step(), step / STABLE_SHARE)
+        if dt is not None and rtol is None:
+            check_turn(scene, self.dt)
         self._check_stability()
 
     @classmethod
@@ -178,92 +172,42 @@ class Simulation:
         return simulation
 
     @property
-    def scene(self) -> Scene:
-        """The scene."""
-        return self._scene
-
-    @property
     def scheme(self) -> str:
         """The scheme in time."""
         return self._native.scheme
 
     @property
     def dt(self) -> float:
-        """Length of a step [s]."""
+        """Length of fixed steps, scale of the first adaptive one [s].
+
+        Setting it asks for fixed steps of that length from now on.
+        """
         return self._native.dt
 
     @dt.setter
     def dt(self, value: float) -> None:
         self._native.dt = number("dt", value, Bounds("s", above=0.0))
+        self._settings.update(dt=self._native.dt, rtol=None)
+        self._native.set_tolerance(None)
+        check_turn(self._scene, value)
         self._check_stability()
 
     @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self._native.time
+    def rtol(self) -> float | None:
+        """Relative error that adaptive steps keep to; None for fixed steps. It may be set."""
+        rtol: float | None = self._settings["rtol"]
+        return rtol
 
-    @property
-    def nodes(self) -> FloatArray:
-        """Positions (N, 3) of the nodes [m]; a copy."""
-        return self._native.nodes
-
-    @property
-    def edges(self) -> IntArray:
-        """Start and end node (E, 2) of the edges."""
-        return edges_of(self._scene)
-
-    @property
-    def immersed_edges(self) -> IntArray:
-        """Start and end node (W, 2) of the edges in the fluid: those that go with a force density."""
-        return immersed_edges(self._scene)[0]
-
-    def flow(self, points: Any) -> FloatArray:
-        """Return the velocity (M, 3) of the fluid at points (M, 3) [m], driven by the immersed edges [m/s].
-
-        Raises
-        ------
-        FlagrsError
-            If the fluid is not of regularized Stokeslet segments.
-        SceneError
-            For points of the wrong shape.
-        """
-        threads = self._settings["threads"]
-        return flow_of(self._scene, self.nodes, self.frame()["force_density"], points, threads)
+    @rtol.setter
+    def rtol(self, value: float | None) -> None:
+        rtol = chosen_rtol(value, None, self.scheme)
+        self._settings["rtol"] = rtol
+        self._native.set_tolerance(None if rtol is None else local_tolerance(self._scene, rtol))
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """What has been warned of so far, with the worst value of each kind."""
         return self._guards.found
-
-    @property
-    def theta(self) -> FloatArray:
-        """Angles (E,) of the material frames against the reference frames [rad]; a copy."""
-        return self._native.theta
-
-    @property
-    def velocities(self) -> FloatArray:
-        """Velocities (N, 3) of the nodes over the last step [m/s]; a copy."""
-        return self._native.velocities
-
-    @property
-    def dof_of_node(self) -> IntArray:
-        """First of the three degrees of freedom of each node (N,) in `gradient` and `hessian`."""
-        return self._native.dof_of_node
-
-    @property
-    def dof_of_edge(self) -> IntArray:
-        """Degree of freedom of each edge's angle (E,) in `gradient` and `hessian`."""
-        return self._native.dof_of_edge
-
-    @property
-    def mass(self) -> FloatArray:
-        """Mass (ndof,) of each degree of freedom [kg or kg m^2]."""
-        return self._native.mass
-
-    @property
-    def terms(self) -> list[str]:
-        """Names of the terms this scene carries."""
-        return self._native.terms
 
     @property
     def statistics(self) -> dict[str, float]:
@@ -278,10 +222,10 @@ class Simulation:
         return self._native.statistics() | numbers | {"warnings": len(self._guards.found)}
 
     def step(self, n: int = 1) -> None:
-        """Make n steps of `dt`.
+        """Make n steps; an adaptive one is made of two parts at the start and after a jump.
 
-        A step that does not converge is made in halves, quarters and so on, or, with `rtol`, again with 0.4
-        of its length.
+        Their length is what the relative error allows, or `dt` if steps are fixed. A fixed step that does not
+        converge is made in halves, quarters and so on, an adaptive one again with 0.4 of its length.
 
         Raises
         ------
@@ -303,7 +247,8 @@ class Simulation:
     ) -> Trajectory:
         """Run until a time and return what was recorded.
 
-        Steps are shortened a little so that a whole number of them makes `save_every`. The file is
+        Frames between adaptive steps are interpolated; fixed steps are shortened a little so that a whole
+        number of them makes `save_every`. The file is
         complete at any moment: a run that is killed can be read, and gone on with by `Simulation.restore`.
 
         Parameters
@@ -380,7 +325,7 @@ class Simulation:
 
     def _frame_at(self, time: float, end: float) -> dict[str, Any]:
         """Return the frame at a time, reached by fixed steps or interpolated between adaptive ones."""
-        if self._settings["rtol"] is None:
+        if self.rtol is None:
             self._reach(time)
             return self.frame()
         self._native.advance_past(time, end)
@@ -416,39 +361,9 @@ class Simulation:
             For a wrong shape, a value that is not finite, or a shape that is not a configuration; nothing
             is changed.
         """
-        self._native.place(_array("nodes", nodes, 2), None if theta is None else _array("theta", theta, 1))
-
-    def energy(self) -> Mapping[str, float]:
-        """Return the elastic energies [J]: stretching, bending, twisting and their total."""
-        parts = self._native.energies()
-        return dict(zip(("stretching", "bending", "twisting"), parts, strict=True)) | {"total": sum(parts)}
-
-    def gradient(self) -> FloatArray:
-        """Return the gradient (ndof,) of the elastic energy [N, N m].
-
-        The numbering interleaves ``x0 y0 z0 theta0 x1 ...``; see `dof_of_node` and `dof_of_edge`. Angles
-        of torque-driven motors come last.
-        """
-        return self._native.gradient()
-
-    def hessian(self) -> scipy.sparse.csc_matrix:
-        """Return the Hessian (ndof, ndof) of the elastic energy, numbered as `gradient` [N/m, N, N m]."""
-        values, rows, starts = self._native.hessian()
-        size = self._native.dof_count
-        return scipy.sparse.csc_matrix((values, rows, starts), shape=(size, size))
-
-    def resistance(self) -> FloatArray:
-        """Return the resistance (3N, 3N) of the nodes to the fluid [N s/m], zero for dry nodes.
-
-        ``resistance() @ velocities.ravel()`` is the force that drags the nodes at these velocities; twist
-        drag and head are not in it.
-        """
-        require_memory(
-            f"the resistance of {self._scene.node_count} nodes",
-            3 * 72.0 * self._scene.node_count**2,
-            "there is no smaller form of it; simulations of large scenes never form it",
+        self._native.place(
+            real_array("nodes", nodes, 2), None if theta is None else real_array("theta", theta, 1)
         )
-        return self._native.resistance()
 
     def stable_step(self) -> float:
         """Return the longest stable step of the explicit scheme [s]: 2 / lambda_max(M^-1 Res)."""
@@ -471,28 +386,6 @@ class Simulation:
                 stacklevel=3,
             )
 
-    @property
-    def minimum_gap(self) -> float:
-        """Smallest distance of surfaces that may touch [m]: negative in an overlap, infinite without any."""
-        return self._native.minimum_gap
-
-    def contact_forces(self) -> tuple[IntArray, FloatArray]:
-        """Return the pairs that push each other, and how hard.
-
-        Returns
-        -------
-        pairs : ndarray
-            Edges (K, 2) in the scene's global numbering; the head as a sphere comes after the last edge.
-        forces : ndarray
-            Normal force (K,) of each pair [N].
-        """
-        state = self._native.state()
-        return state["contact_pairs"], state["contact_forces"]
-
-    def frame(self) -> dict[str, Any]:
-        """Return everything known of the present instant; see `flagrs.frame.FIELDS` for shapes and units."""
-        return self._native.frame()
-
     def state(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that changes, to the last bit."""
         return self._native.state()
@@ -511,7 +404,7 @@ class Simulation:
         missing = present.keys() - state.keys()
         if missing:
             raise not_allowed("state", f"without {', '.join(sorted(missing))}", "what state() returned")
-        self._native.load_state({name: _part(name, state[name], like) for name, like in present.items()})
+        self._native.load_state({name: state_part(name, state[name], like) for name, like in present.items()})
 
     def checkpoint(self, path: str | Path, overwrite: bool = False) -> None:
         """Write the present state to a file that `restore` reads.
@@ -535,9 +428,8 @@ class Simulation:
     def __copy__(self) -> Self:
         """Return a simulation of its own at the same state, which goes on to the same bits."""
         with self._exclusive.held():
-            options = self._settings
-            twin = type(self)(self._scene, **options)
-            twin.dt = self.dt
+            twin = type(self)(self._scene, **(self._settings | {"force": self._force}))
+            twin._native.dt = self.dt
             twin.load_state(self.state())
         return twin
 
@@ -554,46 +446,5 @@ class Simulation:
 
     def __repr__(self) -> str:
         """Describe the simulation in a line."""
-        return f"<flagrs.Simulation of {self._scene.name!r}: {self._native!r}>"
-
-
-def _part(name: str, value: Any, like: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return an array of a state as the core takes it."""
-    array = np.asarray(value)
-    if array.dtype != like.dtype or array.ndim != like.ndim:
-        found = f"{array.ndim}-dimensional {array.dtype}"
-        raise not_allowed(f"state.{name}", found, f"{like.ndim}-dimensional {like.dtype}")
-    return array
-
-
-def _array(field: str, value: Any, dimensions: int) -> FloatArray:
-    try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise not_allowed(field, value, f"numbers in {dimensions} dimensions") from None
-    if np.iscomplexobj(value):
-        raise not_allowed(field, value, "real numbers")
-    if array.ndim != dimensions:
-        raise SceneError(
-            f"{field}: shape {np.shape(value)} is not allowed; must have {dimensions} dimensions",
-            field=field,
-            value=value,
-            allowed=f"{dimensions} dimensions",
-        )
-    return array
-
-
-def _check_scheme(scene: Scene, scheme: str) -> None:
-    if scheme not in SCHEMES:
-        raise not_allowed("scheme", scheme, f"one of {', '.join(SCHEMES)}")
-    if scheme != "overdamped":
-        return
-    wet = scene.fluid is not None and scene.fluid.model != "none"
-    if not wet or not any(rod.immersed_array().any() for rod in scene.rods):
-        raise SceneError(
-            "scheme: overdamped is not allowed without a fluid; must be implicit, or the scene needs a "
-            "fluid with a model that resists motion",
-            field="scheme",
-            value=scheme,
-            allowed="implicit or explicit for a scene without drag",
-        )
+        steps = steps_in_words(self.rtol, self.dt)
+        return f"<flagrs.Simulation of {self._scene.name!r}: {self._native!r}, {steps}>"

@@ -1,4 +1,4 @@
-"""The studies of the supplementary text: convergence with the mesh, and three geometries of the flagella."""
+"""The studies of Lim et al.: convergence with the mesh, and three geometries of the flagella."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from typing import Any
 
 from flagrs import plot, scenarios, sweep
 from flagrs.runs import RunSettings
+from flagrs.step_choice import RelativeError
 from flagrs.sweep import Case
 
 RPMS = tuple(float(rpm) for rpm in range(5, 55, 5))
-#: 37, 41, 45, 51, 59 and 73 nodes, as in the text, and one mesh more, of 81; in metres.
+#: 37, 41, 45, 51, 59 and 73 nodes, as in Lim et al., and one mesh more, of 81; in metres.
 EDGE_LENGTHS = (9e-3, 8e-3, 7e-3, 6e-3, 5e-3, 4e-3, 3.5e-3)
 PITCHES = (5.0, 7.0, 9.0)
 
@@ -49,7 +50,7 @@ def convergence(
     edge_lengths: Sequence[float] = EDGE_LENGTHS,
     duration: float = 100.0,
     save_every: float = 0.1,
-    rtol: float | None = 1e-3,
+    rtol: RelativeError = "auto",
     dt: float | None = None,
     scheme: str = "overdamped",
     processes: int | None = None,
@@ -70,8 +71,7 @@ def convergence(
     save_every
         Simulated time between frames [s].
     rtol, dt, scheme
-        Relative error of adaptive steps (None: fixed ones), time step [s] and scheme; see
-        `flagrs.Simulation`.
+        Relative error of adaptive steps, length of fixed ones [s] and scheme; see `flagrs.Simulation`.
     processes
         Number of worker processes; by default one for each processor.
     progress
@@ -93,7 +93,7 @@ def geometries(
     pitches: Sequence[float] = PITCHES,
     duration: float = 100.0,
     save_every: float = 0.1,
-    rtol: float | None = 1e-3,
+    rtol: RelativeError = "auto",
     dt: float | None = None,
     scheme: str = "overdamped",
     processes: int | None = None,
@@ -114,8 +114,7 @@ def geometries(
     save_every
         Simulated time between frames [s].
     rtol, dt, scheme
-        Relative error of adaptive steps (None: fixed ones), time step [s] and scheme; see
-        `flagrs.Simulation`.
+        Relative error of adaptive steps, length of fixed ones [s] and scheme; see `flagrs.Simulation`.
     processes
         Number of worker processes; by default one for each processor.
     progress

@@ -40,7 +40,7 @@ class Suggestion:
         [m].
     errors : dict
         What each source of error is worth in the scene as it is, relative: ``time step`` with the suggested
-        `rtol`, ``mesh``, ``regularization`` (the seed's against that of slender-body
+        `rtol`, ``mesh``, ``regularization`` (Lim et al.'s against that of slender-body
         theory), ``fluid model`` (resistive force theory against nonlocal drag).
     dominant : str
         The largest of them.
@@ -130,15 +130,15 @@ def fluid_errors(scene: Scene, fluid: Fluid, body: Body) -> dict[str, float]:
     halved = body.halved()
     coarse, fine = rss_response(body, nonlocal_fluid), rss_response(halved, nonlocal_fluid)
     local = rft_response(scene, body, fluid)
-    seed, slender = (
-        rss_response(body, fluid.model_copy(update={"epsilon": name})) for name in ("seed", "slender")
+    close, slender = (
+        rss_response(body, fluid.model_copy(update={"epsilon": name})) for name in ("lim-et-al", "slender")
     )
     if fluid.model == "RFT":
         coarse, fine = local, rft_response(scene, halved, fluid)
     # First order in the edge: half of the error is gone with half of the edge.
     return {
         "mesh": 2.0 * coarse.difference(fine),
-        "regularization": seed.difference(slender) if fluid.model == "RSS" else 0.0,
+        "regularization": close.difference(slender) if fluid.model == "RSS" else 0.0,
         "fluid model": local.difference(rss_response(body, nonlocal_fluid)),
     }
 

@@ -6,23 +6,29 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from flagrs import trajectory_file
+from flagrs.assemble import edges_of
 from flagrs.budget import EnergyBudget, budget_of
 from flagrs.errors import FileError, FlagrsError
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.fluid import hat_weights
+from flagrs.force_density import ForceDensity
 from flagrs.frame import shapes_of
 from flagrs.guards import Notice, notices
 from flagrs.measures import along, angle_about, slope, spin_about, window
+from flagrs.results.material_frames import directors
 from flagrs.scene import Head, Motor, Scene, Table, codec
 from flagrs.scene.rod_topology import edges_at_nodes, far_end
 from flagrs.scene.scene_checks import edges_of_head
-from flagrs.scene.values import FloatArray
+from flagrs.scene.values import FloatArray, IntArray
 from flagrs.trajectory_file import Contents
+
+if TYPE_CHECKING:
+    from flagrs.view import View
 
 
 class Trajectory:
@@ -67,7 +73,7 @@ class Trajectory:
         self.nodes = frames["nodes"]
         self.theta = frames["theta"]
         self.velocities = frames["velocities"]
-        self.force_density = frames["force_density"]
+        self.force_density = ForceDensity(frames["force_density"], immersed_edges(scene)[0])
         self.motor_angle = frames["motor_angle"]
         self.motor_speed = frames["motor_speed"]
         self.motor_torque = frames["motor_torque"]
@@ -316,6 +322,37 @@ class Trajectory:
         """Return the positions (T, n, 3) of the nodes of one rod [m]."""
         offset = self.scene.node_offset(rod)
         return self.nodes[:, offset : offset + len(self.scene.rods[rod].nodes)]
+
+    @property
+    def edges(self) -> IntArray:
+        """Start and end node (E, 2) of the edges."""
+        return edges_of(self.scene)
+
+    @property
+    def radius(self) -> FloatArray:
+        """Radius (E,) of the edges [m]."""
+        return np.concatenate([rod.radius_array() for rod in self.scene.rods])
+
+    def material_directors(self, frames: Any = None) -> FloatArray:
+        """Return the material director m1 (F, E, 3) of the edges.
+
+        Frames hold the angles of the directors against others that the simulation carries along in time;
+        those are found again from the nodes, to a fraction of a degree if the run ended in a checkpoint, as
+        runs do (`flagrs.results.material_frames`).
+
+        Parameters
+        ----------
+        frames
+            Indices (F,) of the frames, in increasing order; None: all.
+        """
+        chosen = np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64)
+        return directors(self.scene, self.time, self.nodes, self.theta, chosen, self._contents.state)
+
+    def view(self, **options: Any) -> View:
+        """Return the run in three dimensions, for a notebook or a page to `save`; see `flagrs.view.view`."""
+        from flagrs.view import view  # views read trajectories, so they are above this module
+
+        return view(self, **options)
 
     def _global_node(self, part: Head | Motor, node: int) -> int:
         return self.scene.node_offset(part.rod) + node

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -65,13 +66,15 @@ class TrajectoryWriter:
         temporary = laid_out(self.path, contents)
         try:
             lock = Lock(temporary)
-            file = h5py.File(temporary, "r+", libver="latest", locking=False)
-            file.swmr_mode = True
+            file = None
             try:
+                file = h5py.File(temporary, "r+", libver="latest", locking=False)
+                file.swmr_mode = True
                 publish(temporary, self.path, replace)
-            except BaseException:
-                file.close()
-                lock.release()
+            except BaseException as error:
+                _close_into_nowhere(file, lock)
+                if isinstance(error, (OSError, RuntimeError)) and not isinstance(error, FileError):
+                    raise self._failed(error) from None
                 raise
         finally:
             temporary.unlink(missing_ok=True)
@@ -166,25 +169,32 @@ class TrajectoryWriter:
         try:
             action()
         except (OSError, RuntimeError) as error:
-            self._abandon()
-            cause = error if isinstance(error, OSError) else OSError(errno.EIO, str(error))
-            raise file_error(self.path, cause, "cannot be written") from None
+            _close_into_nowhere(self._file, self._lock)
+            raise self._failed(error) from None
 
-    def _abandon(self) -> None:
-        """Close without another byte going to the disk; what was flushed before stays readable."""
-        try:
-            descriptor = self._file.id.get_vfd_handle()
-            sink = (
-                os.memfd_create("flagrs") if hasattr(os, "memfd_create") else os.open(os.devnull, os.O_RDWR)
-            )
-            os.sendfile(sink, self._lock.descriptor, 0, os.fstat(self._lock.descriptor).st_size)
-            os.dup2(sink, descriptor)
-            os.close(sink)
-            self._file.close()
-        except (OSError, RuntimeError, ValueError):
-            pass  # HDF5 is beyond help; what is on the disk is as after a kill
-        finally:
-            self._lock.release()
+    def _failed(self, error: OSError | RuntimeError) -> FileError:
+        """Return what to tell of a failure of the disk, of which HDF5 makes an error of either kind."""
+        if not isinstance(error, OSError):
+            told = re.search(r"errno = (\d+)", str(error))
+            error = OSError(int(told[1]) if told else errno.EIO, str(error))
+        return file_error(self.path, error, "cannot be written")
+
+
+def _close_into_nowhere(file: h5py.File | None, lock: Lock) -> None:
+    """Close without another byte going to the disk; what was flushed before stays readable."""
+    try:
+        if file is None:
+            return
+        descriptor = file.id.get_vfd_handle()
+        sink = os.memfd_create("flagrs") if hasattr(os, "memfd_create") else os.open(os.devnull, os.O_RDWR)
+        os.sendfile(sink, lock.descriptor, 0, os.fstat(lock.descriptor).st_size)
+        os.dup2(sink, descriptor)
+        os.close(sink)
+        file.close()
+    except (OSError, RuntimeError, ValueError):
+        pass  # HDF5 is beyond help; what is on the disk is as after a kill
+    finally:
+        lock.release()
 
 
 def _datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:

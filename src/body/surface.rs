@@ -23,13 +23,13 @@ const DEPTH_IN_REACHES: f64 = 0.6;
 const FITTED: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Spacing of the points on which the fit is judged.
 const JUDGED: f64 = 0.6;
-/// Singular values that count as zero, over the largest.
+/// Pivots of the fit that count as zero, over the largest.
 const CUT: f64 = 1e-12;
 /// Spacing of sources over the reach of the surface, at first, and by what it is multiplied until the fit is good enough.
 const COARSEST: f64 = 0.7;
 const FINER: f64 = 0.84;
 /// Most sources: beyond, the fit takes minutes.
-const MOST_SOURCES: usize = 1500;
+const MOST_SOURCES: usize = 800;
 /// Error of a resistance over the square of the root-mean-square velocity left on the surface: what the sources miss of the traction is
 /// of the order of the velocity that they leave, and the two together make the error. The largest ratio found was 5
 /// (spheroids up to 5:1, capsule, rounded cylinders).
@@ -40,11 +40,14 @@ const RESISTANCE_PER_SQUARE: f64 = 9.0;
 #[non_exhaustive]
 pub enum SurfaceError {
     /// More sources would be needed than can be fitted.
-    #[error("{sources} sources inside the body leave an error of {reached:.1e} where {asked:.1e} is asked for")]
+    #[error(
+        "an error of {asked:.1e} needs more than {MOST_SOURCES} sources inside the body: the next finer fit has {sources}, the finest \
+         one leaves {reached:.1e}"
+    )]
     Accuracy {
-        /// Sources of the finest fit.
+        /// Sources of the first fit that is too fine.
         sources: usize,
-        /// Its estimated error.
+        /// Estimated error of the one before, infinite if there is none.
         reached: f64,
         /// The error that is asked for.
         asked: f64,
@@ -76,18 +79,17 @@ impl Surface {
     /// [`SurfaceError::Accuracy`] if there is none that can be computed.
     pub fn new(shape: &Shape, accuracy: f64) -> Result<Self, SurfaceError> {
         let sampler = shape.sampler();
-        let mut fineness = COARSEST;
-        let mut best: Option<Self> = None;
+        let (mut fineness, mut reached) = (COARSEST, f64::INFINITY);
         loop {
-            if let Some(best) = best.as_ref().filter(|_| sampler.points(fineness, 1.0).len() > MOST_SOURCES) {
-                let (sources, reached) = (best.sources.len(), best.error);
+            let sources = sampler.points(fineness, 1.0).len();
+            if sources > MOST_SOURCES {
                 return Err(SurfaceError::Accuracy { sources, reached, asked: accuracy });
             }
             let surface = Self::with_fineness(&sampler, fineness)?;
             if surface.error <= accuracy {
                 return Ok(surface);
             }
-            best = Some(surface);
+            reached = surface.error;
             fineness *= FINER;
         }
     }

@@ -11,7 +11,7 @@
 //! nodes: `m / dt^2` with inertia (equation 21) plus `zeta / dt` with implicit drag, `zeta` the node's own resistance (at no
 //! inertia the drag takes the place of the mass). For equal nodes `k = k_A / 2`, the factor 1/2 of equation 20. The
 //! force balance is solved anew after every pass, detection included, until every overlap and, for pairs that push, every gap is
-//! below the tolerance. Unlike the seed's displacements, forces may shrink again within the loop, so those of the last
+//! below the tolerance. Unlike Lim et al.'s displacements, forces may shrink again within the loop, so those of the last
 //! step can be its start: the fixed point is the same. Forces are equal and opposite and act along the line between
 //! their points, so that they have neither a resultant nor a torque. Theory: docs/theory, "Contact".
 

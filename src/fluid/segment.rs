@@ -8,7 +8,7 @@
 //! d = x - start - a (end - start),   R^2 = |d|^2 + eps^2
 //! ```
 //!
-//! (Cortez, J. Comput. Phys. 375 (2018) 783; the seed's eq. 12-14, with the misprint in 14e mended.) Both blocks are
+//! (Cortez, J. Comput. Phys. 375 (2018) 783; Lim et al.'s eq. 12-14, with the misprint in 14e mended.) Both blocks are
 //! symmetric. The textbook antiderivatives lose all digits on the segment's axis and far away. Here every block is put
 //! together from six moments about a *base* on the axis, `d = base + alpha s` with `s = start - end`:
 //!

@@ -1,6 +1,6 @@
 //! Resistance of a filament to spinning about its own centreline: `4 pi mu a^2` torque per length per angular velocity.
 //!
-//! Stokeslets give none; for the seed's flagella it adds about a tenth to the torque (docs/theory, "Twist drag").
+//! Stokeslets give none; for Lim et al.'s flagella it adds about a tenth to the torque (docs/theory, "Twist drag").
 
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{Assembly, Element, Increment, Term};

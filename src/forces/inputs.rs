@@ -1,6 +1,6 @@
 //! Signals that loads follow: each is a channel, evaluated once at the end of a step and the same for every iterate.
 
-use crate::elastic::signal::{Signal, SignalError};
+use crate::signal::{Signal, SignalError};
 
 /// Index of one signal among a scene's inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

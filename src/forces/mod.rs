@@ -1,5 +1,7 @@
-//! What loads a filament from outside: forces, torques and magnetic moments that follow signals of time.
+//! What drives and loads a filament: motors, weight, inertia; forces, torques and magnetic moments that follow signals of time.
 //!
+//! * [`motors`]: prescribed angle or torque of a shaft against its housing (equation 4, corrected).
+//! * [`inertia`], [`weight`]: masses, and forces that do not depend on the state.
 //! * [`inputs`]: the signals of a scene's loads, evaluated once a step.
 //! * [`edge_vector`]: a vector fixed in the material frame of an edge, with its derivatives.
 //! * [`laboratory`]: forces on nodes and torques on edges, fixed in the laboratory.
@@ -9,7 +11,10 @@
 
 pub mod edge_vector;
 pub mod follower;
+pub mod inertia;
 pub mod inputs;
 pub mod laboratory;
 pub mod magnetic;
+pub mod motors;
 pub mod outside;
+pub mod weight;

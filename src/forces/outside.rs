@@ -6,9 +6,9 @@
 
 use std::sync::Arc;
 
-use crate::elastic::signal::SignalError;
 use crate::rod::configuration::{Configuration, node};
 use crate::rod::network::Network;
+use crate::signal::SignalError;
 use crate::{Mat3, Vec3};
 
 /// What a caller's function sees: the state at the beginning of a step.

@@ -13,10 +13,10 @@
 use nalgebra::{Rotation3, Unit};
 
 use crate::Vec3;
-use crate::elastic::signal::{Signal, SignalError};
 use crate::rod::configuration::node;
 use crate::rod::frames::{signed_angle, transport_through};
 use crate::rod::reference::ReferenceFrames;
+use crate::signal::{Signal, SignalError};
 
 /// A turn about an axis fixed in space.
 #[derive(Debug, Clone)]

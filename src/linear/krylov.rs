@@ -28,6 +28,9 @@ pub struct Gmres {
     projected: Vec<f64>,
 }
 
+/// Part of a product, out of reach of the products before it, that is no more than round-off: the operator is singular there.
+const DEPENDENT: f64 = 16.0 * f64::EPSILON;
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
@@ -103,6 +106,7 @@ impl Gmres {
                 return Err(LinearError::Singular { what: "Newton" });
             }
             column[k + 1] = length;
+            let stretched = norm(&column[..k + 2]);
             for j in 0..k {
                 let (c, s) = self.rotations[j];
                 let (upper, lower) = (column[j], column[j + 1]);
@@ -110,10 +114,10 @@ impl Gmres {
                 column[j + 1] = c * lower - s * upper;
             }
             let radius = column[k].hypot(length);
-            iterations += 1;
-            if radius == 0.0 {
+            if radius <= DEPENDENT * stretched {
                 break;
             }
+            iterations += 1;
             let (c, s) = (column[k] / radius, length / radius);
             self.rotations[k] = (c, s);
             column[k] = radius;
@@ -139,7 +143,7 @@ impl Gmres {
                 value -= self.hessenberg[row + column * stride] * self.projected[column];
             }
             let pivot = self.hessenberg[row + row * stride];
-            self.projected[row] = if pivot == 0.0 { 0.0 } else { value / pivot };
+            self.projected[row] = value / pivot;
         }
         for (k, z) in self.preconditioned.chunks_exact(self.size).take(iterations).enumerate() {
             let weight = scale * self.projected[k];

@@ -5,7 +5,7 @@
 //! * [`ldlt`]: LDL^T of a symmetric one (faer).
 //! * [`nearly_symmetric`]: the one of these two that a matrix needs.
 //! * [`dense`]: LU of a dense unsymmetric matrix (faer).
-//! * [`pseudo_inverse`]: least squares by a singular value decomposition (faer).
+//! * [`pseudo_inverse`]: least squares, cut off where a matrix is singular to working precision.
 //! * [`krylov`]: right-preconditioned GMRES for operators that are only known by their action.
 
 pub mod dense;

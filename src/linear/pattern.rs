@@ -78,8 +78,8 @@ impl Pattern {
         self.row_indices[range.clone()].binary_search(&row).ok().map(|k| range.start + k)
     }
 
-    /// This pattern and dense blocks over further stencils, each given by the first of every three degrees of freedom in a row;
-    /// and where each of its own entries is stored there.
+    /// This pattern and dense blocks over further stencils, each given by the first of every three degrees of freedom in a row,
+    /// no two of which overlap; and where each of its own entries is stored there.
     pub fn extended<'a>(&self, stencils: impl Iterator<Item = &'a [usize]>) -> (Self, Vec<u32>) {
         let mut blocks: Vec<(usize, usize)> = stencils
             .flat_map(|stencil| stencil.iter().flat_map(move |&column| stencil.iter().map(move |&row| (column, row))))

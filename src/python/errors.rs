@@ -3,10 +3,10 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::dynamics::failure::StepError;
-use crate::dynamics::model::ModelError;
 use crate::fluid::far_field::{FarFieldError, LARGEST_TOLERANCE, SMALLEST_TOLERANCE};
 use crate::linear::LinearError;
+use crate::model::ModelError;
+use crate::simulation::failure::StepError;
 
 fn make(py: Python<'_>, class: &str, message: &str, details: &Bound<'_, PyDict>) -> PyErr {
     let made = py

@@ -5,9 +5,9 @@ use pyo3::prelude::*;
 
 use super::arrays::{from_flat, pairs, points, values};
 use super::errors::{far_field_error, scene_error};
-use crate::dynamics::threads::Threads;
 use crate::fluid::far_field::FarField;
 use crate::fluid::product::BLOCK_MEMORY;
+use crate::runtime::threads::Threads;
 
 /// `8 pi mu u = A f` for given segments and targets.
 #[pyclass]

@@ -6,8 +6,8 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods}
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::elastic::signal::SignalError;
 use crate::forces::outside::{ForceFunction, Given, Surroundings};
+use crate::signal::SignalError;
 use crate::{Mat3, Vec3};
 
 /// Forces (N, 3), torques (E, 3) or nothing, stiffness (N, 3, 3) or nothing.

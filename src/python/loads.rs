@@ -7,9 +7,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::specification::SignalInput;
-use crate::dynamics::specification::{FlowSpecification, Frame, LoadKind, LoadSpecification, MagnetismSpecification};
-use crate::elastic::signal::{Signal, SignalError};
 use crate::fluid::ambient::function::FlowFunction;
+use crate::model::specification::{FlowSpecification, Frame, LoadKind, LoadSpecification, MagnetismSpecification};
+use crate::signal::{Signal, SignalError};
 use crate::{Mat3, Vec3};
 
 type VectorInput<'py> = [SignalInput<'py>; 3];

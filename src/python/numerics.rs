@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use super::arrays::{from_points, pairs, points, values};
 use super::errors::scene_error;
 use crate::contact::distance::segment_distance as distance;
-use crate::dynamics::threads;
 use crate::fluid::stokeslet;
+use crate::runtime::threads;
 
 fn regularizations(py: Python<'_>, epsilon: &PyReadonlyArray1<'_, f64>, edges: usize) -> PyResult<Vec<f64>> {
     let epsilon = values(epsilon);

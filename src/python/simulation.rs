@@ -9,14 +9,14 @@ use pyo3::types::PyDict;
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
-use crate::dynamics::budget::Account;
-use crate::dynamics::control::Control;
-use crate::dynamics::failure::StepError;
-use crate::dynamics::predictor::{History, Sample};
-use crate::dynamics::scheme::Scheme;
-use crate::dynamics::simulation as core;
-use crate::dynamics::state::State;
+use crate::bdf::control::Control;
+use crate::bdf::history::{History, Sample};
 use crate::rod::reference::ReferenceFrames;
+use crate::simulation as core;
+use crate::simulation::failure::StepError;
+use crate::state::State;
+use crate::step::budget::Account;
+use crate::step::scheme::Scheme;
 
 /// A running simulation; the class `flagrs.Simulation` wraps it.
 #[pyclass(module = "flagrs._flagrs")]

@@ -11,13 +11,13 @@ use super::errors::scene_error;
 use super::loads::{FlowInput, LoadInput, MagnetismInput};
 use crate::Vec3;
 use crate::contact::stiffness::Stiffness;
-use crate::dynamics::specification::{
+use crate::fluid::product::FarFieldChoice;
+use crate::kinematics::clamp::{Motion, Turning};
+use crate::model::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
     HeadSpecification, MotorSpecification, Specification,
 };
-use crate::elastic::signal::{Function, Signal, SignalError};
-use crate::fluid::product::FarFieldChoice;
-use crate::kinematics::clamp::{Motion, Turning};
+use crate::signal::{Function, Signal, SignalError};
 
 /// A signal: a number, a pair of arrays (times, values), or a function with its breaks (s), its resolution (s) and the path of
 /// its field.

@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 
 use flagrs::Vec3;
-use flagrs::dynamics::specification::Specification;
+use flagrs::model::specification::Specification;
 
 /// A small linear congruential generator: the same numbers on every machine.
 pub struct Random(u64);

@@ -5,13 +5,13 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use flagrs::Vec3;
 use flagrs::contact::stiffness::Stiffness;
-use flagrs::dynamics::specification::{
+use flagrs::fluid::product::FarFieldChoice;
+use flagrs::kinematics::clamp::Motion;
+use flagrs::model::specification::{
     ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
     HeadSpecification, MotorSpecification, Specification,
 };
-use flagrs::elastic::signal::Signal;
-use flagrs::fluid::product::FarFieldChoice;
-use flagrs::kinematics::clamp::Motion;
+use flagrs::signal::Signal;
 
 /// Least arc length of an edge of the flagella, m.
 const EDGE_LENGTH: f64 = 5e-3;

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from flagrs.frame import shapes_of
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.scene import Scene
+from flagrs.step_choice import RelativeError, chosen_rtol
 from flagrs.trajectory import Trajectory
 
 SPEED = 2e-3
@@ -41,11 +42,16 @@ class FakeSimulation:
         scene: Scene,
         scheme: str = "overdamped",
         dt: float | None = None,
-        rtol: float | None = None,
+        rtol: RelativeError = "auto",
         threads: int | None = None,
     ) -> None:
         self.scene = scene
-        self.settings = {"scheme": scheme, "dt": dt, "rtol": rtol, "threads": threads}
+        self.settings = {
+            "scheme": scheme,
+            "dt": dt,
+            "rtol": chosen_rtol(rtol, dt, scheme),
+            "threads": threads,
+        }
         self.time = 0.0
         self._restored: Path | None = None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from flagrs import Fluid, Material, Rod, Scene, Simulation
 
-#: The seed's flagellum, short: helix radius, pitch and axial length, rod radius, regularization [m].
+#: Lim et al.'s flagellum, short: helix radius, pitch and axial length, rod radius, regularization [m].
 HELIX = {"helix_radius": 6.36e-3, "pitch": 7 * 6.36e-3, "axial_length": 45e-3, "radius": 1.6e-3}
 EPSILON = 1.65e-3
 
@@ -57,7 +57,7 @@ def _share(total: np.ndarray, parts: np.ndarray) -> float:
 
 
 def soft_helix(youngs_modulus: float, edge_count: int = 12) -> Scene:
-    """Return a free helix in the seed's fluid, without twist drag."""
+    """Return a free helix in Lim et al.'s fluid, without twist drag."""
     material = Material(youngs_modulus=youngs_modulus, density=1260.0)
     rod = Rod.helix(**HELIX, material=material, edge_count=edge_count)
     return Scene(rods=(rod,), fluid=Fluid(viscosity=1.0, epsilon=EPSILON, twist_drag=False))

@@ -68,10 +68,10 @@ def run(contact: dict[str, Any] | bool, rtol: float, until: float) -> np.ndarray
 
 def test_both_methods_and_tolerances_lead_to_the_same_bundle() -> None:
     barrier = run({}, 1e-4, 4.5)
-    seed = run({"method": "spillmann-teschner"}, 1e-4, 4.5)
+    passes = run({"method": "spillmann-teschner"}, 1e-4, 4.5)
     tight = run({"tolerance": 0.02}, 1e-4, 4.5)
     free = run(False, 1e-4, 4.5)
-    apart = [np.linalg.norm(barrier - other, axis=1).max() / HELIX_RADIUS for other in (seed, tight, free)]
+    apart = [np.linalg.norm(barrier - other, axis=1).max() / HELIX_RADIUS for other in (passes, tight, free)]
     # The tolerance itself is worth a hundredth of the helix radius; a bundle without contact is another one.
     assert apart[0] < 0.02
     assert apart[1] < 0.02

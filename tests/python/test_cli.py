@@ -154,7 +154,7 @@ def test_the_help_keeps_units_in_brackets(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert flagrs(monkeypatch, "run", "--help") == 0
-    assert "Time step [s]." in capsys.readouterr().out
+    assert "Length of fixed steps [s]." in capsys.readouterr().out
 
 
 def test_the_package_runs_as_a_module() -> None:

@@ -123,7 +123,7 @@ def test_the_surface_solution_of_a_sphere_is_stokes_law() -> None:
 
 def test_density_taken_for_nodal_force_overstates_the_drag() -> None:
     for length, count, least in ((80.0, 25, 0.12), (200.0, 50, 0.06)):
-        rod = study.straight(length, count, study.SEED)
+        rod = study.straight(length, count, study.LIM_ET_AL)
         for axis in (0, 1):
             density = rod.density(np.tile(np.eye(3)[axis], (count + 1, 1)))
             assert density[:, axis].sum() * length / count > (1.0 + least) * rod.drag(axis)
@@ -154,9 +154,9 @@ def test_torque_of_a_tapered_helix_converges_with_the_square_of_the_edge_length(
     assert (torque[1] - torque[0]) / (torque[2] - torque[1]) == pytest.approx(4.0, rel=0.15)
 
 
-def test_twist_drag_adds_an_eighth_to_the_torque_of_the_seeds_flagella() -> None:
+def test_twist_drag_adds_an_eighth_to_the_torque_of_the_robots_flagella() -> None:
     helix = study.Helix()
-    share = helix.twist_torque / study.of_filament(helix.filament(25, study.SEED)).torque
+    share = helix.twist_torque / study.of_filament(helix.filament(25, study.LIM_ET_AL)).torque
     assert share == pytest.approx(0.12, abs=0.005)
 
 
@@ -216,7 +216,7 @@ def test_a_straight_rod_spinning_in_place_feels_twist_drag_alone() -> None:
 
 def test_the_motor_of_a_stiff_helix_turns_it_against_stokeslets_and_twist_drag() -> None:
     helix = study.Helix()
-    flagellum = helix.filament(25, study.SEED)
+    flagellum = helix.filament(25, study.LIM_ET_AL)
     nodes = np.concatenate([[[-0.010, 0.0, 0.0], [-0.005, 0.0, 0.0], [0.0, 0.0, 0.0]], flagellum.nodes])
     without, with_it = motor_torque(nodes, 3, False), motor_torque(nodes, 3, True)
     # The fluid is held at the start of each step, 1 mrad behind: errors of some 1e-5.

@@ -1,5 +1,6 @@
 """What a run says of itself: energy budget, balances, and warnings when there is reason and only then."""
 
+import re
 import warnings
 
 import flagrs
@@ -77,6 +78,22 @@ def test_adaptive_steps_close_the_budget_more_tightly():
     assert defect[1e-4] < defect[1e-2] < 5e-2
 
 
+@pytest.mark.parametrize(
+    "options, warned", [({"dt": 0.1}, True), ({"dt": 0.03}, False), ({"rtol": 1e-2}, False), ({}, False)]
+)
+def test_steps_in_which_flagella_turn_too_far_are_warned_of(options: dict[str, float], warned: bool):
+    # 15 rad/s: at 1.5 rad a step the two flagella never meet.
+    scene = flagrs.scenarios.clamped_flagella(count=2)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation = flagrs.Simulation(scene, **options)
+    assert [w.category for w in caught] == [flagrs.StepWarning] * warned
+    if warned:
+        assert re.search(r"a turn of 1\.5 rad a step.*below 0\.033 s", str(caught[0].message))
+        with pytest.warns(flagrs.StepWarning, match="a turn of 3 rad"):
+            simulation.dt = 0.2
+
+
 def test_outer_forces_and_torques_of_a_free_robot_vanish():
     simulation = flagrs.Simulation(flagrs.scenarios.robot(contact=False), dt=0.02)
     simulation.step(20)
@@ -104,6 +121,36 @@ def test_energy_from_nowhere_is_warned_of(stored: float, warned: bool):
     account[1], account[5], account[19], account[23], account[24] = 1.0, 0.5, stored, 1.0, stored
     found = [notice.kind for notice in notices(account, flagrs.scenarios.robot())]
     assert found == ["energy made"] * warned
+
+
+@pytest.mark.parametrize("share, warned", [(0.9, False), (1.05, True)])
+def test_explicit_steps_above_their_limit_make_energy_and_warn_of_it(share: float, warned: bool):
+    nodes = np.array([[0.0, 0.0, 0.0], [5e-3, 0.0, 1e-3], [1e-2, 0.0, 1e-3], [1.5e-2, 0.0, 0.0]])
+    material = flagrs.Material(youngs_modulus=1e5, density=2e4)
+    rod = flagrs.Rod(nodes=nodes, rest_nodes=nodes * [1.0, 1.0, 0.0], radius=5e-4, material=material)
+    fluid = flagrs.Fluid(viscosity=1.0, model="RFT", twist_drag=False, density=0.0)
+    scene = flagrs.Scene(rods=rod, fluid=fluid)
+    limit = flagrs.Simulation(scene, scheme="explicit", dt=1e-6).stable_step()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        simulation = flagrs.Simulation(scene, scheme="explicit", dt=share * limit)
+        simulation.step(400)
+    assert [w.category for w in caught if w.category is flagrs.EnergyWarning] == [
+        flagrs.EnergyWarning
+    ] * warned
+    assert ("energy made" in [notice.kind for notice in simulation.warnings]) == warned
+
+
+def test_drag_that_gives_is_energy_from_nowhere():
+    account = np.zeros(42)
+    account[1], account[5], account[19], account[23] = 1.0, -0.04, 1.04, 1.0
+    assert not list(notices(account, flagrs.scenarios.robot()))
+    # The twist drag: no other sink makes up for it.
+    account[5], account[6], account[19] = 0.96, -0.06, 0.1
+    assert [notice.kind for notice in notices(account, flagrs.scenarios.robot())] == ["energy made"]
+    # Contact may give what it has stored.
+    account[5], account[6], account[8], account[19] = 1.0, 0.0, -0.06, 0.06
+    assert not list(notices(account, flagrs.scenarios.robot()))
 
 
 @pytest.mark.parametrize("stretch, warned", [(0.15, False), (0.25, True)])
@@ -171,15 +218,38 @@ def test_flow_at_the_immersed_nodes_is_their_velocity_and_dry_edges_have_no_part
     speed = np.linalg.norm(simulation.velocities[wet], axis=1).max()
     # No slip, but for the fluid's geometry, which is that of the step's beginning.
     assert flow == pytest.approx(simulation.velocities[wet], abs=5e-3 * speed)
+    # A dry edge would carry half a hat of the density of the node that it shares with an immersed one.
+    density = simulation.frame()["force_density"]
     naive = flagrs.fluid.velocity(
-        simulation.nodes[wet],
-        simulation.nodes,
-        simulation.edges,
-        simulation.frame()["force_density"],
-        1.0,
-        1.65e-3,
+        simulation.nodes[wet], simulation.nodes, simulation.edges, np.array(density), 1.0, 1.65e-3
     )
     assert np.abs(naive - simulation.velocities[wet]).max() > 0.05 * speed
+
+
+def test_a_force_density_is_refused_on_dry_edges():
+    simulation = flagrs.Simulation(flagrs.scenarios.robot(contact=False), dt=1e-3)
+    trajectory = simulation.run(until=0.002, save_every=1e-3, path=False)
+    nodes, edges, wet = simulation.nodes, simulation.edges, simulation.immersed_edges
+    assert len(wet) < len(edges)
+    fast = flagrs.fluid.FastMobility(nodes, edges, 1e-3)
+    for density in (
+        simulation.frame()["force_density"],
+        trajectory.force_density[-1],
+        *trajectory.force_density,
+    ):
+        for use in (
+            lambda density=density: flagrs.fluid.velocity(nodes[:1], nodes, edges, density, 1.0, 1e-3),
+            lambda density=density: flagrs.fluid.hat_weights(nodes, edges, density),
+            lambda density=density: fast.apply(density),
+        ):
+            with pytest.raises(flagrs.SceneError, match=r"edges: edge \d+ from node .* immersed_edges"):
+                use()
+        # The immersed ones, in whatever direction, and plain arrays, which know no edges.
+        flagrs.fluid.velocity(nodes[:1], nodes, wet[:, ::-1], density, 1.0, 1e-3)
+        flagrs.fluid.hat_weights(nodes, edges, 1.0 * density)
+    assert type(2.0 * trajectory.force_density) is np.ndarray
+    assert isinstance(trajectory.force_density.max(), float)
+    assert trajectory.force_density[:, :3].edges is None
 
 
 def test_thrust_of_the_robot_is_the_drag_of_its_head():
@@ -215,3 +285,55 @@ def test_plan_tells_the_scales_and_asks_about_units():
     text = str(flagrs.Scene(rods=rod, fluid=fluid, gravity=(0.0, 0.0, -9810.0)).plan())
     for question in ("millimetres?", "mPa s?", "mm/s^2?", "another unit?"):
         assert question in text
+
+
+def test_explicit_steps_far_too_long_end_in_words_and_leave_a_state_of_numbers():
+    nodes = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    bent = nodes + np.array([[0.0, 0.0, 0.06], [0.0, 0.0, -0.05], [0.1, 0.1, 0.0]])
+    material = flagrs.Material(youngs_modulus=1e3, density=1000.0)
+    rod = flagrs.Rod(nodes=nodes, rest_nodes=bent, radius=0.01, material=material)
+    fluid = flagrs.Fluid(viscosity=1.0, twist_drag=False, density=0.0)
+    simulation = flagrs.Simulation(flagrs.Scene(rods=rod, fluid=fluid), scheme="explicit")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        simulation.dt *= 100.0
+        with pytest.raises(flagrs.ConvergenceError, match="nodes fly away, which steps too long"):
+            simulation.step(50)
+    # 1e10 times its size away a filament would be no more than round-off of its coordinates.
+    assert np.abs(simulation.nodes).max() < 1e10 * 2.0
+    for name, value in simulation.frame().items():
+        assert np.isfinite(value).all() or name == "minimum_gap", name
+
+
+def test_energies_that_are_no_numbers_end_a_step_in_words():
+    # Nothing but its energy is too large: both nodes are held, and no node goes too far.
+    material = flagrs.Material(youngs_modulus=1e3, density=1000.0)
+    rod = flagrs.Rod(nodes=[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], radius=0.01, material=material, EA=1e300)
+    clamps = (flagrs.Clamp(nodes=(0,)), flagrs.Clamp(nodes=(1,), velocity=(1e6, 0.0, 0.0)))
+    fluid = flagrs.Fluid(viscosity=1.0, model="RFT", density=0.0)
+    simulation = flagrs.Simulation(flagrs.Scene(rods=rod, fluid=fluid, clamps=clamps), dt=1.0)
+    with pytest.raises(flagrs.ConvergenceError, match="energies grow beyond all bounds"):
+        simulation.step()
+    assert all(np.isfinite(value).all() for value in simulation.state().values())
+
+
+def test_velocities_of_an_instant_are_no_reynolds_number():
+    x = np.linspace(0.0, 0.1, 21)
+    kinked = np.stack([x, 0.0 * x, 0.2 * np.abs(x - 0.05)], axis=1)
+    material = flagrs.Material(youngs_modulus=1e6, density=1000.0)
+    rod = flagrs.Rod(nodes=kinked, rest_nodes=kinked * [1.0, 1.0, 0.0], radius=1e-3, material=material)
+    scene = flagrs.Scene(rods=rod, fluid=flagrs.Fluid(viscosity=1.0, model="RFT"))
+    still = flagrs.Simulation(scene)
+    rows = (still.dof_of_node[:, None] + np.arange(3)).ravel()
+    at_once = np.linalg.solve(still.resistance(), -still.gradient()[rows]).reshape(-1, 3)
+    # A thousandth of a fixed step later, by small steps; the size is a twentieth of the length.
+    short = flagrs.Simulation(scene, dt=1e-5 * still.dt)
+    short.step(100)
+    scale = 1000.0 * 0.1 / 20.0
+    soon = scale * np.linalg.norm(short.velocities, axis=1).max()
+    assert scale * np.linalg.norm(at_once, axis=1).max() > 2.0 * soon
+    simulation = flagrs.Simulation(scene, rtol=1e-2)
+    with pytest.warns(flagrs.ReynoldsWarning):
+        simulation.step(10)
+    (notice,) = [notice for notice in simulation.warnings if notice.kind == "reynolds"]
+    assert 0.3 * soon < notice.value < soon

@@ -1,4 +1,4 @@
-"""Scenes: what they derive, what they refuse and how, and that files keep them to the last bit."""
+"""Scenes: what they derive, what they refuse and how, and what their plans say."""
 
 from __future__ import annotations
 
@@ -27,29 +27,7 @@ from flagrs import (
     rpm,
 )
 from flagrs.scene import signal_value
-from flagrs.scene.shapes import frame
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-SOFT = Material(youngs_modulus=1e6, density=1200.0)
-LINE = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [0.3, 0.0, 0.0]]
-#: A Y: three arms of one edge each that meet at node 1.
-FORK = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.1, 0.0], [0.2, -0.1, 0.0]]
-
-
-def rod(**changes: Any) -> Rod:
-    return Rod(**{"nodes": LINE, "radius": 1e-3, "material": SOFT, **changes})
-
-
-def fork(**changes: Any) -> Rod:
-    return rod(nodes=FORK, edges=[[0, 1], [1, 2], [1, 3]], **changes)
-
-
-def error_of(build: Callable[[], Any]) -> SceneError:
-    with pytest.raises(SceneError) as caught:
-        build()
-    return caught.value
-
+from scene_parts import FORK, LINE, SOFT, error_of, fork, full_scene, rod
 
 # --- errors -------------------------------------------------------------------------------------------------
 
@@ -175,180 +153,6 @@ def test_a_unit_wrong_by_a_thousand_is_asked_about(build: Callable[[], Any], que
     assert question in str(error_of(build))
 
 
-# --- rods ---------------------------------------------------------------------------------------------------
-
-
-def test_a_chain_has_consecutive_edges_and_hinges() -> None:
-    assert rod().edge_array().tolist() == [[0, 1], [1, 2], [2, 3]]
-    assert rod().hinge_array().tolist() == [[0, 1], [1, 2]]
-    assert rod().hinge_nodes().tolist() == [1, 2]
-    assert rod().edge_array().dtype == np.int64
-
-
-def test_a_fork_has_a_hinge_for_every_pair_of_edges() -> None:
-    assert fork().hinge_array().tolist() == [[0, 1], [0, 2], [1, 2]]
-    assert fork().hinge_nodes().tolist() == [1, 1, 1]
-
-
-def test_a_hinge_begins_with_the_edge_that_ends_at_its_node() -> None:
-    turned = rod(edges=[[1, 2], [0, 1], [2, 3]])
-    assert turned.hinge_array().tolist() == [[1, 0], [0, 2]]
-
-
-def test_stiffnesses_of_a_round_section_follow_from_material_and_radius() -> None:
-    made = rod(radius=2e-3)
-    assert made.EA_array() == pytest.approx(np.full(3, 1e6 * math.pi * 4e-6), rel=1e-15)
-    assert made.EI_array() == pytest.approx(
-        np.tile(1e6 * math.pi * 16e-12 / 4 * np.eye(2), (2, 1, 1)), rel=1e-15
-    )
-    # G = E / 3 at Poisson's ratio 1/2
-    assert made.GJ_array() == pytest.approx(np.full(2, 1e6 / 3 * math.pi * 16e-12 / 2), rel=1e-15)
-
-
-def test_stiffnesses_at_a_hinge_are_means_of_its_two_edges() -> None:
-    made = rod(radius=[1e-3, 2e-3, 2e-3])
-    expected = 1e6 * math.pi / 4 * np.array([(1e-12 + 16e-12) / 2, 16e-12])
-    assert made.EI_array()[:, 0, 0] == pytest.approx(expected, rel=1e-15)
-    assert made.GJ_array()[0] / made.GJ_array()[1] == pytest.approx(17 / 32, rel=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("given_stiffness", "expected"),
-    [
-        (2.0, [2 * np.eye(2), 2 * np.eye(2)]),
-        ([2.0, 3.0], [2 * np.eye(2), 3 * np.eye(2)]),
-        ([[2.0, 1.0], [1.0, 3.0]], [[[2, 1], [1, 3]]] * 2),
-        ([np.eye(2), 5 * np.eye(2)], [np.eye(2), 5 * np.eye(2)]),
-    ],
-)
-def test_bending_stiffness_may_be_a_number_a_matrix_or_one_per_hinge(
-    given_stiffness: Any, expected: Any
-) -> None:
-    assert np.array_equal(rod(EI=given_stiffness).EI_array(), np.array(expected))
-
-
-def test_the_rest_shape_is_apart_from_the_initial_shape() -> None:
-    made = rod(rest_nodes=2.0 * np.array(LINE))
-    assert made.rest_lengths() == pytest.approx([0.2, 0.2, 0.2], rel=1e-15)
-    assert np.array_equal(made.nodes, LINE)
-    assert np.array_equal(rod().rest_array(), LINE)
-
-
-@pytest.mark.parametrize(
-    ("changes", "field"),
-    [
-        ({"nodes": np.zeros((0, 3))}, "nodes"),
-        ({"nodes": LINE[:1]}, "nodes"),
-        ({"nodes": [*LINE[:2], LINE[1], LINE[3]]}, "nodes[2]"),
-        ({"nodes": [*LINE[:2], [0.05, 0.0, 0.0], LINE[3]]}, "nodes[1]"),
-        ({"rest_nodes": [*LINE[:2], LINE[1], LINE[3]]}, "rest_nodes[2]"),
-        ({"edges": [[0, 1], [1, 2], [2, 4]]}, "edges[2]"),
-        ({"edges": [[0, 1], [1, 2], [2, 2]]}, "edges[2]"),
-        ({"edges": [[0, 1], [1, 2], [2, 3], [1, 0]]}, "edges[3]"),
-        ({"edges": [[0, 1], [1, 2]]}, "nodes[3]"),
-        ({"edges": [[0, 1], [1, 2], [-1, 3]]}, "edges"),
-        ({"hinges": [[0, 3]]}, "hinges[0]"),
-        ({"hinges": [[0, 2]]}, "hinges[0]"),
-        ({"hinges": [[0, 0]]}, "hinges[0]"),
-        ({"hinges": [[0, 1], [1, 0]]}, "hinges[1]"),
-    ],
-)
-def test_a_rod_that_cannot_be_is_refused_by_name(changes: dict[str, Any], field: str) -> None:
-    assert field in [part.field for part in error_of(lambda: rod(**changes)).errors]
-
-
-def test_antiparallel_edges_are_found_whichever_way_the_edges_run() -> None:
-    nodes = [LINE[0], LINE[1], [0.05, 0.0, 0.0], LINE[3]]
-    error = error_of(lambda: rod(nodes=nodes, edges=[[1, 0], [1, 2], [3, 2]]))
-    assert [part.field for part in error.errors] == ["nodes[1]", "nodes[2]"]
-    assert "edges 0 and 1 are antiparallel" in str(error)
-
-
-@given(st.floats(-12.0, 3.0).map(lambda power: 10.0**power))
-@settings(max_examples=30, deadline=None)
-def test_no_length_is_too_small_or_too_large_by_itself(scale: float) -> None:
-    made = rod(nodes=scale * np.array(LINE), radius=scale * 1e-3)
-    assert made.rest_lengths() == pytest.approx(np.full(3, 0.1 * scale), rel=1e-14)
-
-
-@given(st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: math.hypot(*d) > 1e-3))
-@settings(max_examples=200, deadline=None)
-def test_the_frame_about_any_direction_is_right_handed_and_orthonormal(
-    direction: tuple[float, float, float],
-) -> None:
-    axes = np.stack(frame(direction))
-    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-14)
-    assert np.linalg.det(axes) == pytest.approx(1.0, abs=1e-14)
-    assert axes[0] == pytest.approx(np.array(direction) / math.hypot(*direction), abs=1e-14)
-
-
-def test_the_frame_is_orthonormal_next_to_the_direction_opposite_to_x() -> None:
-    for off in (0.0, 1e-12, 1e-9, 1e-6, 1e-4, 2e-3):
-        axes = np.stack(frame((-1.0, off, off)))
-        assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-14)
-
-
-@pytest.mark.parametrize(("handedness", "sign"), [("left", -1.0), ("right", 1.0)])
-def test_a_helix_has_its_radius_pitch_handedness_and_equal_edges(handedness: Any, sign: float) -> None:
-    made = Rod.helix(
-        helix_radius=0.01,
-        pitch=0.05,
-        axial_length=0.1,
-        edge_length=2e-3,
-        handedness=handedness,
-        radius=1e-3,
-        material=SOFT,
-    )
-    x, y, z = made.nodes.T
-    assert np.hypot(y, z) == pytest.approx(np.full(len(x), 0.01), rel=1e-14)
-    assert x[-1] == pytest.approx(0.1, rel=1e-14)
-    assert np.unwrap(np.arctan2(z, y)) == pytest.approx(sign * 2 * math.pi * x / 0.05, abs=1e-12)
-    contour = 2 * math.hypot(2 * math.pi * 0.01, 0.05)
-    assert len(x) - 1 == int(contour / 2e-3)
-    assert made.rest_lengths() == pytest.approx(np.full(len(x) - 1, made.rest_lengths()[0]), rel=1e-12)
-
-
-def test_a_helix_about_another_axis_is_the_same_helix_turned() -> None:
-    size: dict[str, Any] = {"helix_radius": 0.01, "pitch": 0.05, "axial_length": 0.1, "edge_count": 40}
-    one = Rod.helix(**size, radius=1e-3, material=SOFT)
-    other = Rod.helix(**size, radius=1e-3, material=SOFT, direction=(0.3, -2.0, 1.0), point=(1.0, 2.0, 3.0))
-    turn = np.stack(frame((0.3, -2.0, 1.0)))
-    assert other.nodes - [1.0, 2.0, 3.0] == pytest.approx(one.nodes @ turn, abs=1e-14)
-
-
-def test_the_phase_turns_a_helix_right_handed_about_its_axis() -> None:
-    for handedness in ("left", "right"):
-        made = Rod.helix(
-            helix_radius=0.01,
-            pitch=0.05,
-            axial_length=0.1,
-            edge_count=40,
-            radius=1e-3,
-            material=SOFT,
-            handedness=handedness,
-            phase=math.pi / 2,
-        )
-        assert made.nodes[0] == pytest.approx([0.0, 0.0, 0.01], abs=1e-16)
-
-
-def test_a_straight_rod_takes_either_edge_length_or_edge_count() -> None:
-    size: dict[str, Any] = {"length": 0.3, "radius": 1e-3, "material": SOFT}
-    # 0.3 / 0.1 is 2.9999999999999996 in floating point
-    assert len(Rod.straight(**size, edge_length=0.1).edge_array()) == 3
-    assert len(Rod.straight(**size, edge_count=7).edge_array()) == 7
-    for both in ({}, {"edge_length": 0.1, "edge_count": 3}):
-        assert error_of(lambda both=both: Rod.straight(**size, **both)).field == "edge_length"  # type: ignore[misc]
-    for bad in (0, -1, 2.5, True):
-        assert error_of(lambda bad=bad: Rod.straight(**size, edge_count=bad)).field == "edge_count"  # type: ignore[misc]
-
-
-def test_a_straight_rod_can_have_a_curved_rest_shape() -> None:
-    bent = np.array(LINE)
-    bent[1, 1] = 0.05
-    made = Rod.straight(length=0.3, edge_count=3, radius=1e-3, material=SOFT, rest_nodes=bent)
-    assert made.rest_lengths()[0] == pytest.approx(math.hypot(0.1, 0.05), rel=1e-14)
-
-
 # --- signals ------------------------------------------------------------------------------------------------
 
 
@@ -416,11 +220,22 @@ def test_a_part_that_cannot_be_is_refused_by_name(build: Callable[[], Any], fiel
 
 
 @pytest.mark.parametrize(
-    ("epsilon", "expected"), [("slender", math.exp(0.5) * 2e-3), ("seed", 1.031 * 2e-3), (5e-4, 5e-4)]
+    ("epsilon", "expected"), [("slender", math.exp(0.5) * 2e-3), ("lim-et-al", 1.031 * 2e-3), (5e-4, 5e-4)]
 )
 def test_the_regularization_is_chosen_by_name_or_length(epsilon: Any, expected: float) -> None:
     found = Fluid(viscosity=1.0, epsilon=epsilon).epsilon_array(np.full(3, 2e-3))
     assert found == pytest.approx(np.full(3, expected), rel=1e-15)
+
+
+def test_the_former_name_of_a_regularization_is_understood_with_a_warning(tmp_path: Path) -> None:
+    with pytest.warns(DeprecationWarning, match="now called 'lim-et-al'"):
+        former = Fluid(viscosity=1.0, epsilon="seed")  # type: ignore[arg-type]
+    assert former == Fluid(viscosity=1.0, epsilon="lim-et-al") and former.epsilon == "lim-et-al"
+    path = tmp_path / "scene.toml"
+    Scene(rods=[rod()], fluid=former).to_toml(path)
+    path.write_text(path.read_text().replace("lim-et-al", "seed"))
+    with pytest.warns(DeprecationWarning, match="epsilon='seed'"):
+        assert Scene.from_toml(path) == Scene(rods=[rod()], fluid=former)
 
 
 # --- scenes -------------------------------------------------------------------------------------------------
@@ -471,108 +286,6 @@ def test_rods_are_numbered_one_after_the_other() -> None:
     assert [scene.edge_offset(number) for number in range(3)] == [0, 3, 6]
     assert (scene.node_count, scene.edge_count, scene.hinge_count) == (12, 9, 7)
     assert np.array_equal(scene.node_array()[4:8], FORK)
-
-
-def full_scene() -> Scene:
-    """Return a scene with every part and numbers that no short decimal represents."""
-    third = 1.0 / 3.0
-    return Scene(
-        rods=[
-            rod(
-                nodes=third * np.array(LINE),
-                EI=[[2e-6, third * 1e-6], [third * 1e-6, 1e-6]],
-                immersed=[True, False, True],
-            ),
-            fork(
-                rest_nodes=1.1 * np.array(FORK),
-                radius=[1e-3, 2e-3, third * 1e-3],
-                natural_twist=third,
-                name="Y",
-            ),
-        ],
-        fluid=Fluid(viscosity=third, model="RFT", epsilon="seed", density=1000.0),
-        head=Head(node=1, radius=third * 1e-2),
-        motors=[Motor(node=2, shaft=2, torque=Table(times=[0.0, third], values=[third, 2.0]))],
-        clamps=[Clamp(rod=1, nodes=(0,), edges=(0,), angular_velocity=third)],
-        loads=[PointLoad(rod=1, node=2, force=(third, 0.0, -1.0))],
-        contact=Contact(exclusion_factor=1.0 + third),
-        gravity=(0.0, 0.0, -9.81),
-        name="everything",
-    )
-
-
-def test_a_scene_survives_toml_and_json_to_the_last_bit(tmp_path: Path) -> None:
-    scene = full_scene()
-    scene.to_toml(tmp_path / "scene.toml")
-    for copy in (Scene.from_toml(tmp_path / "scene.toml"), Scene.from_json(scene.to_json())):
-        assert copy == scene and hash(copy) == hash(scene) and copy.digest() == scene.digest()
-
-
-def test_scenes_that_differ_in_one_bit_are_different() -> None:
-    scene = full_scene()
-    other = scene.replace(gravity=(0.0, 0.0, -np.nextafter(9.81, 10.0)))
-    assert other != scene and other.digest() != scene.digest()
-
-
-def test_a_function_of_time_cannot_be_written(tmp_path: Path) -> None:
-    scene = Scene(rods=[rod()], motors=[Motor(node=1, shaft=0, speed=lambda time: time)])
-    for write in (scene.to_json, lambda: scene.to_toml(tmp_path / "scene.toml"), scene.digest):
-        error = error_of(write)
-        assert error.field == "motors[0].speed" and "flagrs.Table" in str(error)
-
-
-def toml_scene(tmp_path: Path, text: str) -> Scene:
-    path = tmp_path / "scene.toml"
-    path.write_text(text)
-    return Scene.from_toml(path)
-
-
-MATERIAL = "material = { youngs_modulus = 1e6, density = 1200 }\n"
-HELIX = """
-[[rods]]
-shape = 'helix'
-helix_radius = 0.01
-pitch = 0.05
-axial_length = 0.1
-edge_length = 5e-3
-radius = 1e-3
-"""
-
-
-def test_a_toml_rod_may_name_a_shape(tmp_path: Path) -> None:
-    scene = toml_scene(tmp_path, HELIX + MATERIAL)
-    expected = Rod.helix(
-        helix_radius=0.01, pitch=0.05, axial_length=0.1, edge_length=5e-3, radius=1e-3, material=SOFT
-    )
-    assert scene.rods == (expected,)
-
-
-def test_a_toml_file_may_name_a_scenario_with_parameters(tmp_path: Path) -> None:
-    scene = toml_scene(tmp_path, "scenario = 'robot'\n[parameters]\nrpm = 30.0\nfluid = { model = 'RFT' }\n")
-    assert scene == flagrs.scenarios.robot(rpm=30.0, fluid={"model": "RFT"})
-
-
-@pytest.mark.parametrize(
-    ("text", "field"),
-    [
-        (HELIX.replace("pitch = 0.05", "pitch = -1") + MATERIAL, "rods[0].pitch"),
-        (HELIX.replace("helix'", "spiral'") + MATERIAL, "rods[0].shape"),
-        (HELIX.replace("pitch = 0.05\n", "") + MATERIAL, "rods[0]"),
-        (HELIX + MATERIAL.replace("1e6", "-1"), "rods[0].material.youngs_modulus"),
-        (HELIX + "radus = 1\n" + MATERIAL, "rods[0].radus"),
-        (HELIX + MATERIAL + "[fluids]\nviscosity = 1.0\n", "fluids"),
-        (HELIX + MATERIAL + "[fluid]\nviscosity = '1 Pa s'\n", "fluid.viscosity"),
-        ("scenario = 'robott'\n", "scenario"),
-        ("scenario = 'robot'\n[parameters]\nrmp = 30.0\n", "rmp"),
-        ("scenario = 'robot'\nrpm = 30.0\n", "rpm"),
-    ],
-)
-def test_an_error_in_a_toml_file_names_the_field(tmp_path: Path, text: str, field: str) -> None:
-    assert error_of(lambda: toml_scene(tmp_path, text)).field == field
-
-
-def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
-    assert "scene.toml: not a TOML file" in str(error_of(lambda: toml_scene(tmp_path, "rods = [")))
 
 
 # --- plans --------------------------------------------------------------------------------------------------

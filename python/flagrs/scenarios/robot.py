@@ -1,4 +1,4 @@
-"""The robot of the supplementary text: two soft helical flagella, two motors, one head."""
+"""The robot of Lim et al.: two soft helical flagella, two motors, one head."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flagrs.scene.shapes import Helix, edge_count, helix_nodes, number
 from flagrs.scene.values import Bounds, FloatArray
 from flagrs.units import rpm as revolutions_per_minute
 
-# Table 1 of the supplementary text, as resolved in docs/theory; lengths in metres.
+# Table 1 of Lim et al., as resolved in docs/theory; lengths in metres.
 SILICONE = Material(youngs_modulus=1.255e6, poisson_ratio=0.5, density=1260.0)
 ROD_RADIUS = 1.6e-3
 EPSILON = 1.65e-3
@@ -39,7 +39,7 @@ def robot(
     C_r: float = 0.9,
     scale: float = 1.0,
 ) -> Scene:
-    """Return the swimming robot of the supplementary text: two flagella, two motors, one head.
+    """Return the swimming robot of Lim et al.: two flagella, two motors, one head.
 
     One chain runs from the tip of flagellum 1 through its axis point, motor 1, a corner, the head, a corner,
     motor 2 and an axis point to the tip of flagellum 2. Both left-handed helices lie along +x; the robot
@@ -59,8 +59,8 @@ def robot(
     contact
         Whether the flagella keep apart, or how: a `Contact` or a mapping of its options.
     fluid
-        Another fluid, or a mapping of options to change; the default is 1 Pa s with the text's epsilon, 1.65
-        mm.
+        Another fluid, or a mapping of options to change; the default is 1 Pa s with Lim et al.'s epsilon,
+        1.65 mm.
     twist_drag
         False switches the flagella's resistance to spinning off, as in the text.
     C_t, C_r

@@ -33,7 +33,7 @@ class Contact(Part):
     method : str
         ``barrier``: a potential of the distance that no accepted state can overcome; ``spillmann-teschner``:
         penetrating pairs are pushed apart by passes around each step until the deepest penetration is below
-        the tolerance (supplementary text, equations 19 to 21). docs/theory/contact.md says when either is
+        the tolerance (Lim et al., equations 19 to 21). docs/theory/contact.md says when either is
         right.
     tolerance : float or None
         ``barrier``: contact acts where centrelines are between ``1 - tolerance`` and ``1 + tolerance`` times

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,8 +14,11 @@ from flagrs.scene.flow import Flow, flow_of
 from flagrs.scene.part import Part
 from flagrs.scene.values import Array, Bounds, Flag, FloatArray, index, number, optional_number
 
-#: Regularization over rod radius, by name: matching slender-body theory, and the supplementary text's choice.
-EPSILON_RATIO = {"slender": math.sqrt(math.e), "seed": 1.031}
+#: Regularization over rod radius, by name: matching slender-body theory, and Lim et al.'s choice.
+EPSILON_RATIO = {"slender": math.sqrt(math.e), "lim-et-al": 1.031}
+
+#: Names that regularizations had before.
+FORMER_NAMES = {"seed": "lim-et-al"}
 
 #: Immersed nodes from which on a step takes less time without the segments' matrix (docs/performance.md).
 CROSSOVER = 500
@@ -27,9 +31,16 @@ _length = Array(((),), Bounds("m", above=0.0))
 
 def _epsilon(value: Any) -> Any:
     if isinstance(value, str):
-        if value not in EPSILON_RATIO:
-            raise not_allowed("", value, "'slender', 'seed' or a length > 0 m")
-        return value
+        name = FORMER_NAMES.get(value, value)
+        if name not in EPSILON_RATIO:
+            raise not_allowed("", value, "'slender', 'lim-et-al' or a length > 0 m")
+        if name != value:
+            warnings.warn(
+                f"epsilon={value!r} is now called {name!r}; the former name will go in version 1.0",
+                DeprecationWarning,
+                stacklevel=2,
+            )
+        return name
     return _length(value)
 
 
@@ -49,8 +60,8 @@ class Fluid(Part):
         ``none``.
     epsilon : str or float
         Regularization of the segments: ``slender`` is sqrt(e) times the rod's radius, which matches
-        slender-body theory; ``seed`` is 1.031 times the radius, as in the supplementary text; or a length
-        [m].
+        slender-body theory; ``lim-et-al`` is 1.031 times the radius, as in Lim et al.
+        (docs/bibliography.md), and was called ``seed`` before; or a length [m].
     twist_drag : bool
         Whether a filament spinning about its own centreline is resisted, by 4 pi mu a^2 per unit length.
     coefficients : str
@@ -74,7 +85,7 @@ class Fluid(Part):
 
     viscosity: Annotated[float, number(Bounds("Pa s", above=0.0, at_most=1e4, if_large="given in mPa s?"))]
     model: Literal["RSS", "RFT", "none"] = "RSS"
-    epsilon: Annotated[Literal["slender", "seed"] | float, PlainValidator(_epsilon)] = "slender"
+    epsilon: Annotated[Literal["slender", "lim-et-al"] | float, PlainValidator(_epsilon)] = "slender"
     twist_drag: Flag = True
     coefficients: Literal["gray-hancock", "lighthill"] = "gray-hancock"
     wavelength: Annotated[float | None, optional_number(Bounds("m", above=0.0))] = None

@@ -12,7 +12,7 @@ class Head(Part):
     """A spherical head at a node with exactly two neighbours (docs/theory/fluid.md, section 9).
 
     It is fixed to both edges that meet there, but not to the shaft of a motor that sits at its own node, and
-    resists turning about any axis: rigid turns across the edges as in the supplementary text (equations 16
+    resists turning about any axis: rigid turns across the edges as in Lim et al. (equations 16
     to 18), turns about the edges by their material frames.
 
     Attributes

@@ -11,6 +11,7 @@ import numpy as np
 from flagrs.memory import in_words
 from flagrs.scene.plausibility import Scales, implausible, scales_of
 from flagrs.scene.values import FloatArray
+from flagrs.step_choice import DEFAULT_RTOL
 
 if TYPE_CHECKING:
     from flagrs.scene.scene import Scene
@@ -107,6 +108,7 @@ class Plan:
         lines.append(f"scales:   {self.scales}")
         lines.append(f"memory:   about {in_words(self.memory)}")
         lines.append(f"a step:   about {self.flops / 1e6:.3g} million floating-point operations")
+        lines.append(f"steps:    adaptive, to rtol = {DEFAULT_RTOL:g}, unless dt or another rtol is given")
         return "\n".join([*lines, *(f"warning:  {warning}" for warning in self.warnings)])
 
 

@@ -63,7 +63,7 @@ def checked_count(value: object) -> int:
 def edge_count(contour: float, edge_length: float) -> int:
     """Return how many edges of at least `edge_length` fit into a contour, both in metres.
 
-    The quotient is rounded down, as in the supplementary text; 1e-9 of slack keeps 0.3 m / 0.1 m at 3.
+    The quotient is rounded down, as in Lim et al.; 1e-9 of slack keeps 0.3 m / 0.1 m at 3.
     """
     edge_length = length("edge_length", edge_length)
     ratio = contour / edge_length * (1.0 + 1e-9)

@@ -22,7 +22,7 @@ def settle(scene: Scene) -> Simulation:
     FlagrsError
         If it does not come to rest in 400 steps.
     """
-    simulation = Simulation(scene, threads=1)
+    simulation = Simulation(scene, rtol=None, threads=1)
     size = float(np.ptp(simulation.nodes, axis=0).max())
     for _ in range(400):
         simulation.step()

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{AmbientFlow, Local};
 use crate::Vec3;
-use crate::elastic::signal::SignalError;
+use crate::signal::SignalError;
 
 /// Velocities (m/s) at points (m) at a time (s).
 pub type FlowFunction = Arc<dyn Fn(&[Vec3], f64) -> Result<Vec<Vec3>, SignalError> + Send + Sync>;

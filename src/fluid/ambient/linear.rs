@@ -1,7 +1,7 @@
 //! Uniform flows and velocity gradients: `u = U(t) + s(t) G (x - c)`.
 
 use super::{AmbientFlow, Local};
-use crate::elastic::signal::{Signal, SignalError};
+use crate::signal::{Signal, SignalError};
 use crate::{Mat3, Vec3};
 
 /// A flow linear in the position.

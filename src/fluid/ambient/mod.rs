@@ -11,8 +11,8 @@ pub mod linear;
 pub mod poiseuille;
 
 use crate::Vec3;
-use crate::elastic::signal::SignalError;
 use crate::rod::assembly::Background;
+use crate::signal::SignalError;
 
 /// Velocity and half the vorticity at a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::{AmbientFlow, Local};
 use crate::Vec3;
-use crate::elastic::signal::{Signal, SignalError};
+use crate::signal::{Signal, SignalError};
 
 /// `u = U(t) (1 - d^2 / R^2) e` with the distance `d` from an axis along `e`, or from a plane that holds `e`.
 ///

@@ -1,0 +1,35 @@
+//! Forces that do not depend on the state: weight less buoyancy.
+
+use crate::linear::pattern::Pattern;
+use crate::rod::assembly::{Assembly, Increment, Term};
+use crate::rod::configuration::Configuration;
+
+/// Forces that do not depend on the state: weight less buoyancy.
+pub struct Weight {
+    forces: Vec<f64>,
+}
+
+impl Weight {
+    /// Generalised force on every degree of freedom.
+    pub fn new(forces: Vec<f64>) -> Self {
+        Self { forces }
+    }
+}
+
+impl Term for Weight {
+    fn name(&self) -> &'static str {
+        "weight"
+    }
+
+    fn stencils(&self) -> Vec<Vec<usize>> {
+        Vec::new()
+    }
+
+    fn bind(&mut self, _: &Pattern) {}
+
+    fn add(&self, _: &Configuration, _: &Increment, out: &mut Assembly) {
+        for (residual, force) in out.residual.iter_mut().zip(&self.forces) {
+            *residual -= force;
+        }
+    }
+}

@@ -1,0 +1,494 @@
+//! The constant part of a simulation, built once from a specification: topology, stiffness, and the terms a scene needs.
+//!
+//! * [`specification`]: a scene as plain data.
+//! * [`contact`]: how rods are kept apart.
+//! * [`filaments`]: the parts of a scene that move on their own, and their sizes; `round_off`: how exactly forces are known.
+//! * `scene_terms`: the terms that a scene asks for.
+//! * `breaks`: instants at which what drives a scene has a corner or a jump.
+
+pub(crate) mod breaks;
+pub mod contact;
+pub mod filaments;
+pub(crate) mod round_off;
+pub(crate) mod scene_terms;
+pub mod specification;
+
+use crate::Vec3;
+use crate::bdf::control::Control;
+use crate::bdf::history::History;
+use crate::contact::potential::BarrierLaw;
+use crate::elastic::bending::Bending;
+use crate::elastic::hinges::Hinges;
+use crate::elastic::stretching::Stretching;
+use crate::elastic::twisting::Twisting;
+use crate::fluid::FluidModel;
+use crate::fluid::ambient::{Ambient, AmbientFlow};
+use crate::fluid::head::MOST_EDGES;
+use crate::fluid::product::FarFieldChoice;
+use crate::fluid::rft::ResistiveForce;
+use crate::fluid::rss::StokesletSegments;
+use crate::forces::inertia::Inertia;
+use crate::forces::inputs as load;
+use crate::forces::motors::{Drive, Motor};
+use crate::kinematics::clamp::{Clamp, ClampedEdge};
+use crate::linear::LinearError;
+use crate::linear::pattern::Pattern;
+use crate::model::breaks::Breaks;
+use crate::model::contact::{ContactModel, Overlap};
+use crate::model::filaments::Filaments;
+use crate::model::round_off::RoundOff;
+use crate::model::scene_terms::{dissipative_terms, load_terms, masses, regularization, spin_resistances, weights};
+use crate::model::specification::{FlowSpecification, FluidModelSpecification, Specification};
+use crate::rod::assembly::{HingeElement, Term};
+use crate::rod::configuration::{Configuration, ShaftAngle};
+use crate::rod::network::{Network, NetworkError};
+use crate::rod::reference::ReferenceFrames;
+use crate::signal::SignalError;
+use crate::state::State;
+use crate::step::budget::{self, Account};
+use std::f64::consts::PI;
+
+/// A model cannot be built from its specification.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// The topology is not valid.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// An array has the wrong length.
+    #[error("{field}: length {length} is not allowed; must be {expected}")]
+    Length {
+        /// Which array.
+        field: &'static str,
+        /// Its length.
+        length: usize,
+        /// What it should be.
+        expected: usize,
+    },
+    /// A value is out of range.
+    #[error("{field}: {value} is not allowed; must be {allowed}")]
+    Value {
+        /// Which quantity.
+        field: String,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// A shape cannot be a configuration: an edge without length, or two edges of a hinge folded onto each other.
+    #[error("{shape}: an edge without length, or two edges folded onto each other, are not allowed")]
+    Shape {
+        /// Which shape.
+        shape: &'static str,
+    },
+    /// Two bodies are closer than contact can start from.
+    #[error("{0}")]
+    Overlap(Overlap),
+    /// A matrix of the model cannot be analysed.
+    #[error(transparent)]
+    Linear(#[from] LinearError),
+}
+
+/// Everything about a scene that does not change.
+pub struct Model {
+    pub(crate) network: Network,
+    pub(crate) dof_count: usize,
+    pub(crate) stretching: Stretching,
+    pub(crate) hinges: Hinges,
+    pub(crate) dissipative: Vec<Box<dyn Term>>,
+    pub(crate) inertia: Inertia,
+    pub(crate) motors: Vec<Motor>,
+    pub(crate) clamps: Vec<Clamp>,
+    pub(crate) prescribed: Vec<bool>,
+    pub(crate) breaks: Breaks,
+    pub(crate) pattern: Pattern,
+    pub(crate) filaments: Filaments,
+    /// Turns residuals into forces: 1 for positions, one over a length for angles.
+    pub(crate) force_weight: Vec<f64>,
+    /// Turns errors of degrees of freedom into those relative to the size of a filament; 0 for what is prescribed.
+    pub(crate) error_weight: Vec<f64>,
+    pub(crate) round_off: RoundOff,
+    pub(crate) mass: Vec<f64>,
+    pub(crate) contact: Option<ContactModel>,
+    pub(crate) inputs: load::Inputs,
+    pub(crate) flows: Vec<Box<dyn AmbientFlow>>,
+    /// Weights less buoyancy on every degree of freedom, N.
+    pub(crate) weights: Vec<f64>,
+    /// Connected part of every node, and which parts nothing holds.
+    pub(crate) part_of_node: Vec<usize>,
+    pub(crate) free_parts: Vec<bool>,
+    /// Regularization of the immersed edges, m; zero for others.
+    pub(crate) regularization: Vec<f64>,
+    pub(crate) specification: Specification,
+}
+
+fn expect(field: &'static str, length: usize, expected: usize) -> Result<(), ModelError> {
+    if length == expected { Ok(()) } else { Err(ModelError::Length { field, length, expected }) }
+}
+
+impl Model {
+    /// Builds the model and its initial state.
+    ///
+    /// # Errors
+    /// [`ModelError`] naming what is not valid.
+    pub fn new(specification: Specification) -> Result<(Self, State), ModelError> {
+        let network = Network::new(specification.nodes.len(), &specification.edges, &specification.hinges)?;
+        check(&specification)?;
+        let dof_count = network.dof_count() + specification.motors.iter().filter(|motor| motor.by_torque).count();
+        let motors = motors(&specification, network.dof_count());
+        let rest = RestShape::new(&specification, &network)?;
+        let elements = (0..network.hinges().len())
+            .map(|hinge| HingeElement::new(&network, hinge, free_angle(&motors, hinge)))
+            .collect();
+        let mut stretching = Stretching::new(&network, specification.stretching.clone(), rest.lengths.clone());
+        let mut hinges = Hinges::new(elements, rest.bending(&specification), rest.twisting(&specification));
+        let mass = masses(&specification, &network, dof_count, &rest.lengths);
+        let mut inertia = Inertia::new(mass.clone());
+        let mut dissipative = dissipative_terms(&specification, &network, dof_count, &rest.lengths);
+        let mut inputs = load::Inputs::default();
+        dissipative.extend(load_terms(&specification, &network, &rest.lengths, &mut inputs));
+        let mut stencils: Vec<Vec<usize>> = stretching.stencils();
+        stencils.extend(hinges.stencils());
+        stencils.extend(dissipative.iter().flat_map(|term| term.stencils()));
+        let pattern = Pattern::from_stencils(dof_count, stencils.iter().map(Vec::as_slice));
+        stretching.bind(&pattern);
+        hinges.bind(&pattern);
+        inertia.bind(&pattern);
+        dissipative.iter_mut().for_each(|term| term.bind(&pattern));
+
+        let (clamps, prescribed) = clamps(&specification, &network, dof_count);
+        let filaments = Filaments::new(&specification, &network, &stencils, &prescribed, &rest.lengths);
+        let force_weight = filaments.force_weights(&network);
+        let spin = spin_resistances(&specification, &rest.lengths);
+        let round_off = RoundOff::new(&specification, &network, dof_count, (&rest.lengths, &rest.voronoi), &spin);
+        let contact = specification
+            .contact
+            .as_ref()
+            .map(|contact| ContactModel::new(contact, &network, &rest.lengths, &specification.radius));
+        let state = initial_state(&specification, &network, dof_count);
+        let held: Vec<bool> = (0..network.node_count()).map(|k| prescribed[network.node_dofs()[k]]).collect();
+        let (part_of_node, mut free_parts) = budget::parts(network.edges(), &held, contact.is_some());
+        let turned = network.edges().iter().zip(network.edge_dofs()).filter(|(_, dof)| prescribed[**dof]);
+        turned.for_each(|(&[i, _], _)| free_parts[part_of_node[i]] = false);
+        let turning = clamps.iter().filter(|clamp| !clamp.edges.is_empty()).map(|clamp| &clamp.motion.spin);
+        let others = clamps.iter().flat_map(|clamp| clamp.motion.shifts()).chain(inputs.signals());
+        let model = Self {
+            breaks: Breaks::new(&motors, turning, others),
+            weights: weights(&specification, &network, dof_count, &rest.lengths),
+            part_of_node,
+            free_parts,
+            regularization: regularization(&specification),
+            dof_count,
+            stretching,
+            hinges,
+            dissipative,
+            inertia,
+            motors,
+            clamps,
+            prescribed,
+            pattern,
+            mass,
+            error_weight: filaments.error_weights(&force_weight),
+            filaments,
+            round_off,
+            force_weight,
+            contact,
+            network,
+            inputs,
+            flows: specification.flows.iter().map(FlowSpecification::flow).collect(),
+            specification,
+        };
+        let mut configuration = Configuration::new(&model.network, model.dof_count);
+        if !configuration.update(&model.network, &state.q, &state.frames, &model.shafts(&state.motor_angles, &state.q))
+        {
+            return Err(ModelError::Shape { shape: "nodes" });
+        }
+        Ok((model, state))
+    }
+
+    /// The deepest overlap of a state from which contact cannot go on.
+    pub(crate) fn overlap(&self, state: &State) -> Option<Overlap> {
+        self.contact.as_ref()?.overlap(&state.positions(&self.network))
+    }
+
+    /// The law of barrier contact, if there is any.
+    pub(crate) fn barrier(&self) -> Option<&BarrierLaw> {
+        self.contact.as_ref().and_then(ContactModel::barrier)
+    }
+
+    /// Topology and numbering.
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// The parts that move on their own.
+    pub fn filaments(&self) -> &Filaments {
+        &self.filaments
+    }
+
+    /// Number of bodies that contact knows: edges, and with barrier contact spheres.
+    pub fn body_count(&self) -> usize {
+        self.barrier().map_or(self.network.edges().len(), |law| law.bodies().radius().len())
+    }
+
+    /// Number of degrees of freedom, free motor angles last.
+    pub fn dof_count(&self) -> usize {
+        self.dof_count
+    }
+
+    /// Mass of every degree of freedom: kg for positions, kg m^2 for angles.
+    pub fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    /// Sparsity pattern of the derivative.
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// Names of the active terms.
+    pub fn term_names(&self) -> Vec<&'static str> {
+        let mut names = vec![self.stretching.name(), self.hinges.name()];
+        names.extend(self.dissipative.iter().map(|term| term.name()));
+        names
+    }
+
+    /// Angles of all shafts.
+    pub(crate) fn shafts(&self, angles: &[f64], q: &[f64]) -> Vec<ShaftAngle> {
+        self.motors.iter().zip(angles).map(|(motor, &angle)| motor.shaft(angle, q)).collect()
+    }
+
+    /// The background flow where the nodes are, if there is any.
+    pub(crate) fn ambient(&self, nodes: &[Vec3], time: f64) -> Result<Option<Ambient>, SignalError> {
+        if self.flows.is_empty() {
+            return Ok(None);
+        }
+        let mut ambient = Ambient::default();
+        ambient.update(&self.flows, nodes, self.network.edges(), time)?;
+        Ok(Some(ambient))
+    }
+
+    /// A fresh drag model, with its own workspace.
+    pub(crate) fn fluid(&self) -> Result<Option<Box<dyn FluidModel>>, LinearError> {
+        self.fluid_with(None)
+    }
+
+    /// A fresh drag model with a choice of its own on when there is no matrix.
+    pub(crate) fn fluid_with(
+        &self,
+        choice: Option<&FarFieldChoice>,
+    ) -> Result<Option<Box<dyn FluidModel>>, LinearError> {
+        let Some(fluid) = self.specification.fluid.as_ref() else { return Ok(None) };
+        let (edges, nodes) = (self.network.edges(), &self.specification.nodes);
+        if !fluid.immersed.iter().any(|&immersed| immersed) {
+            return Ok(None);
+        }
+        Ok(Some(match &fluid.model {
+            FluidModelSpecification::ResistiveForce { coefficients } => {
+                Box::new(ResistiveForce::new(edges, &fluid.immersed, coefficients))
+            }
+            FluidModelSpecification::StokesletSegments { epsilon, far_field } => {
+                let local = preconditioner_drag(fluid.viscosity, &self.specification, epsilon);
+                let (immersed, far_field) = (&fluid.immersed, choice.unwrap_or(far_field));
+                Box::new(StokesletSegments::new(nodes, edges, immersed, epsilon, fluid.viscosity, &local, far_field)?)
+            }
+        }))
+    }
+}
+
+/// Slender-body coefficients with the logarithm of the mean edge's aspect ratio: a guess good enough to precondition with.
+fn preconditioner_drag(viscosity: f64, specification: &Specification, epsilon: &[f64]) -> Vec<[f64; 2]> {
+    specification
+        .edges
+        .iter()
+        .zip(epsilon)
+        .map(|(&[i, j], &epsilon)| {
+            let length = (specification.nodes[j] - specification.nodes[i]).norm();
+            let logarithm = (1.0 + 4.0 * length / epsilon).ln();
+            let across = 4.0 * PI * viscosity / (logarithm + 0.5);
+            [0.5 * across, across]
+        })
+        .collect()
+}
+
+fn check(specification: &Specification) -> Result<(), ModelError> {
+    let (nodes, edges, hinges) = (specification.nodes.len(), specification.edges.len(), specification.hinges.len());
+    if edges == 0 {
+        return Err(ModelError::Length { field: "edges", length: 0, expected: 1 });
+    }
+    expect("rest_nodes", specification.rest_nodes.len(), nodes)?;
+    expect("theta", specification.theta.len(), edges)?;
+    expect("radius", specification.radius.len(), edges)?;
+    expect("density", specification.density.len(), edges)?;
+    expect("stretching", specification.stretching.len(), edges)?;
+    expect("bending", specification.bending.len(), hinges)?;
+    expect("twisting", specification.twisting.len(), hinges)?;
+    expect("natural_curvature", specification.natural_curvature.len(), hinges)?;
+    expect("natural_twist", specification.natural_twist.len(), hinges)?;
+    let positive = |field: &'static str, values: &[f64]| match values.iter().position(|v| !(*v > 0.0 && v.is_finite()))
+    {
+        Some(k) => Err(ModelError::Value { field: format!("{field}[{k}]"), value: values[k], allowed: "> 0" }),
+        None => Ok(()),
+    };
+    positive("radius", &specification.radius)?;
+    positive("stretching", &specification.stretching)?;
+    positive("twisting", &specification.twisting)?;
+    if !specification.reynolds.is_empty() {
+        expect("reynolds", specification.reynolds.len(), nodes)?;
+    }
+    if let Some(head) = &specification.head
+        && !(1..=MOST_EDGES).contains(&head.edges.len())
+    {
+        let (field, value) = ("head.edges".to_owned(), head.edges.len() as f64);
+        return Err(ModelError::Value { field, value, allowed: "1 to 6 edges fixed to the head" });
+    }
+    for (k, ei) in specification.bending.iter().enumerate() {
+        let determinant = ei[0][0] * ei[1][1] - ei[0][1] * ei[1][0];
+        if !(ei[0][0] > 0.0 && determinant > 0.0 && ei[0][1] == ei[1][0]) {
+            return Err(ModelError::Value {
+                field: format!("bending[{k}]"),
+                value: determinant,
+                allowed: "symmetric and positive definite",
+            });
+        }
+    }
+    Ok(())
+}
+
+struct RestShape {
+    lengths: Vec<f64>,
+    voronoi: Vec<f64>,
+    curvatures: Vec<[f64; 2]>,
+    twists: Vec<f64>,
+}
+
+impl RestShape {
+    fn new(specification: &Specification, network: &Network) -> Result<Self, ModelError> {
+        let nodes = &specification.rest_nodes;
+        let lengths: Vec<f64> = network.edges().iter().map(|&[i, j]| (nodes[j] - nodes[i]).norm()).collect();
+        let frames = shape_frames(specification, network, nodes);
+        let mut configuration = Configuration::new(network, network.dof_count());
+        let q = coordinates(network, nodes, &vec![0.0; lengths.len()], network.dof_count());
+        if !configuration.update(network, &q, &frames, &[]) {
+            return Err(ModelError::Shape { shape: "rest_nodes" });
+        }
+        let strains = (0..network.hinges().len()).map(|k| *configuration.strain(k));
+        Ok(Self {
+            voronoi: network
+                .hinges()
+                .iter()
+                .map(|hinge| 0.5 * (lengths[hinge.edges[0]] + lengths[hinge.edges[1]]))
+                .collect(),
+            curvatures: strains.clone().map(|strain| strain.kappa).collect(),
+            twists: strains.map(|strain| strain.tau).collect(),
+            lengths,
+        })
+    }
+
+    fn bending(&self, specification: &Specification) -> Vec<Bending> {
+        (0..self.voronoi.len())
+            .map(|k| Bending {
+                stiffness: specification.bending[k].map(|row| row.map(|entry| entry / self.voronoi[k])),
+                natural: specification.natural_curvature[k].unwrap_or(self.curvatures[k]),
+            })
+            .collect()
+    }
+
+    fn twisting(&self, specification: &Specification) -> Vec<Twisting> {
+        (0..self.voronoi.len())
+            .map(|k| Twisting {
+                stiffness: specification.twisting[k] / self.voronoi[k],
+                natural: specification.natural_twist[k].unwrap_or(self.twists[k]),
+            })
+            .collect()
+    }
+}
+
+fn shape_frames(specification: &Specification, network: &Network, nodes: &[Vec3]) -> ReferenceFrames {
+    let first = |edge: usize| specification.directors.iter().find(|(k, _)| *k == edge).map(|(_, director)| *director);
+    ReferenceFrames::of_shape(network, nodes, &first)
+}
+
+fn coordinates(network: &Network, nodes: &[Vec3], theta: &[f64], dof_count: usize) -> Vec<f64> {
+    let mut q = vec![0.0; dof_count];
+    for (node, &dof) in nodes.iter().zip(network.node_dofs()) {
+        q[dof..dof + 3].copy_from_slice(node.as_slice());
+    }
+    for (&angle, &dof) in theta.iter().zip(network.edge_dofs()) {
+        q[dof] = angle;
+    }
+    q
+}
+
+fn initial_state(specification: &Specification, network: &Network, dof_count: usize) -> State {
+    State {
+        time: 0.0,
+        steps: 0,
+        q: coordinates(network, &specification.nodes, &specification.theta, dof_count),
+        velocity: vec![0.0; dof_count],
+        density: Vec::new(),
+        control: Control::default(),
+        history: History::default(),
+        frames: shape_frames(specification, network, &specification.nodes),
+        tensions: vec![0.0; network.edges().len()],
+        motor_angles: vec![0.0; specification.motors.len()],
+        contacts: Vec::new(),
+        account: Account::default(),
+        contact_anchor: Vec::new(),
+    }
+}
+
+fn motors(specification: &Specification, first_free: usize) -> Vec<Motor> {
+    let mut next = first_free;
+    specification
+        .motors
+        .iter()
+        .map(|motor| Motor {
+            hinge: motor.hinge,
+            shaft_second: motor.shaft_second,
+            drive: if motor.by_torque {
+                next += 1;
+                Drive::Torque { signal: motor.signal.clone(), dof: next - 1 }
+            } else {
+                Drive::Speed(motor.signal.clone())
+            },
+        })
+        .collect()
+}
+
+fn free_angle(motors: &[Motor], hinge: usize) -> Option<(usize, usize, f64)> {
+    motors.iter().filter(|motor| motor.hinge == hinge).find_map(|motor| match motor.drive {
+        Drive::Torque { dof, .. } => {
+            let (row, sign) = Motor::angle_row(motor.shaft_second);
+            Some((dof, row, sign))
+        }
+        Drive::Speed(_) => None,
+    })
+}
+
+fn clamps(specification: &Specification, network: &Network, dof_count: usize) -> (Vec<Clamp>, Vec<bool>) {
+    let mut prescribed = vec![false; dof_count];
+    let clamps = specification
+        .clamps
+        .iter()
+        .map(|clamp| {
+            let nodes: Vec<usize> = clamp.nodes.iter().map(|&node| network.node_dofs()[node]).collect();
+            let whole = clamp.axes == [true; 3];
+            let edges: Vec<ClampedEdge> = clamp
+                .edges
+                .iter()
+                .map(|&edge| ClampedEdge {
+                    dof: network.edge_dofs()[edge],
+                    edge,
+                    rigid: whole && network.edges()[edge].iter().all(|node| clamp.nodes.contains(node)),
+                })
+                .collect();
+            for &dof in &nodes {
+                (0..3).filter(|&c| clamp.axes[c]).for_each(|c| prescribed[dof + c] = true);
+            }
+            edges.iter().for_each(|edge| prescribed[edge.dof] = true);
+            Clamp { nodes, axes: clamp.axes, edges, motion: clamp.motion.clone() }
+        })
+        .collect();
+    (clamps, prescribed)
+}

@@ -1,0 +1,157 @@
+//! States between adaptive steps: interpolated, then brought into the balance of forces that steps keep.
+
+use crate::forces::motors::Drive;
+use crate::model::contact::ContactModel;
+use crate::nonlinear::newton::Goal;
+use crate::simulation::Simulation;
+use crate::simulation::failure::StepError;
+use crate::state::State;
+use crate::step::problem::{Step, Unknowns};
+use crate::step::statistics::Statistics;
+
+/// Most corrections of an interpolated state, and the parts of Newton's goal below which none is made any more and which the
+/// last one may have, its square being what it leaves.
+const MOST_CORRECTIONS: usize = 10;
+const SETTLED: f64 = 1e-4;
+const GOOD: f64 = 1e-2;
+/// Part of the last step over which the interpolated velocity is differenced to an acceleration.
+const DIFFERENCE: f64 = 1e-3;
+
+impl Simulation {
+    /// The state at a time within the last step: interpolated to the order of the past states, then corrected.
+    ///
+    /// Interpolated positions are as exact as steps, but strains of stiff rods are differences of them and far smaller: they are
+    /// found from the balance of forces, with the interpolated rates. Material frames are continuous. Contact forces are those of
+    /// the present state.
+    ///
+    /// # Errors
+    /// [`StepError::Signal`] if a motor's function of time fails.
+    pub fn state_at(&mut self, time: f64) -> Result<State, StepError> {
+        let mut state = self.interpolated(time)?;
+        if !state.history.past.is_empty() {
+            let shafts = self.model.shafts(&state.motor_angles, &state.q);
+            let configuration = &mut self.balance.configuration;
+            if configuration.update(&self.model.network, &state.q, &state.frames, &shafts) {
+                configuration.accept(&mut state.frames);
+                self.settle(&mut state);
+                self.forget_fluid();
+            }
+        }
+        Ok(state)
+    }
+
+    pub(crate) fn interpolated(&self, time: f64) -> Result<State, StepError> {
+        let mut state = self.state.clone();
+        let (past, now) = (&self.state.history, self.state.time);
+        let order = past.past.len().min(state.control.order + 1);
+        past.extrapolate(order, (now, &self.state.q), |s| &s.q, time, &mut state.q);
+        past.extrapolate(order, (now, &self.state.velocity), |s| &s.velocity, time, &mut state.velocity);
+        past.extrapolate(order, (now, &self.state.density), |s| &s.density, time, &mut state.density);
+        for (k, motor) in self.model.motors.iter().enumerate() {
+            match &motor.drive {
+                Drive::Speed(signal) => {
+                    state.motor_angles[k] -= signal.integral(time, now).map_err(StepError::Signal)?;
+                }
+                Drive::Torque { dof, .. } => state.motor_angles[k] = state.q[*dof],
+            }
+        }
+        for clamp in &self.model.clamps {
+            let mut back = || {
+                let spin = if clamp.edges.is_empty() { 0.0 } else { -clamp.motion.spin.integral(time, now)? };
+                clamp.advance((now, &self.state.q), &self.state.frames, (time, spin), &mut state.q)
+            };
+            back().map_err(StepError::Signal)?;
+        }
+        state.time = time;
+        Ok(state)
+    }
+
+    /// Brings an interpolated state into balance, the forces on the fluid being what they are up to the change of rates. Without
+    /// success it stays as it is.
+    fn settle(&mut self, state: &mut State) {
+        let Goal::Displacement(goal) = self.settings.goal else { return };
+        if self.force.is_some() {
+            // What a caller's function would give between steps is not known.
+            return;
+        }
+        let spillmann = self.model.contact.as_ref().and_then(ContactModel::spillmann).is_some();
+        let Some(motor_torques) = self.torques_at(state.time).filter(|_| !spillmann || state.contacts.is_empty())
+        else {
+            return;
+        };
+        let Ok(inputs) = self.model.inputs.values(state.time) else { return };
+        let Ok(ambient) = self.model.ambient(&state.positions(&self.model.network), state.time) else { return };
+        let base = state.clone();
+        let step = Step {
+            scheme: self.scheme,
+            state: &base,
+            motor_angles: base.motor_angles.clone(),
+            motor_torques,
+            rate: 1.0 / (self.state.time - self.state.history.past[0].time),
+            drift: base.velocity.clone(),
+            velocity_drift: self.acceleration_at(state.time),
+            inputs,
+            ambient,
+            outside: None,
+        };
+        let mut found = Unknowns { q: base.q.clone(), density: base.density.clone(), tensions: base.tensions.clone() };
+        if self.correct(&step, &mut found, goal).is_some() {
+            let rates = state.velocity.iter_mut().zip(found.q.iter().zip(&base.q));
+            rates.for_each(|(velocity, (new, old))| *velocity += step.rate * (new - old));
+            (state.q, state.density, state.tensions) = (found.q, found.density, found.tensions);
+            self.balance.configuration.accept(&mut state.frames);
+        }
+    }
+
+    /// Newton's method on the balance of forces, but for the fluid's equation, which needs the fluid's matrix there.
+    fn correct(&mut self, step: &Step, found: &mut Unknowns, goal: f64) -> Option<()> {
+        let Self { model, balance, .. } = self;
+        let mut uncounted = Statistics::default();
+        if balance.fluid_mut().is_some_and(|fluid| fluid.is_local()) {
+            balance.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
+        }
+        balance.begin(model, step, &mut uncounted).ok()?;
+        let (mut direction, mut left) = (found.clone(), f64::INFINITY);
+        for _ in 0..MOST_CORRECTIONS {
+            balance.evaluate(model, step, found, &mut uncounted)?;
+            balance.forget_slip();
+            balance.linearize(model, step, &found.tensions, &mut uncounted).ok()?;
+            left = balance.correction(model, step, goal, &mut uncounted).ok()?.length;
+            balance.last_correction(model, step, &found.tensions, &mut direction).ok()?;
+            let from = found.q.clone();
+            let parts = [(&mut found.q, &direction.q), (&mut found.density, &direction.density)];
+            for (value, change) in parts.into_iter().chain([(&mut found.tensions, &direction.tensions)]) {
+                value.iter_mut().zip(change).for_each(|(value, change)| *value += change);
+            }
+            if balance.step_limit(model, &from, &found.q, &mut uncounted) < 1.0 {
+                return None;
+            }
+            if left <= SETTLED * goal {
+                break;
+            }
+        }
+        (left <= GOOD * goal && balance.place(model, step, &found.q)).then_some(())
+    }
+
+    /// Torques of torque-driven motors, N m, unless one of their functions fails.
+    fn torques_at(&self, time: f64) -> Option<Vec<f64>> {
+        let torque = |drive: &Drive| match drive {
+            Drive::Torque { signal, .. } => signal.value(time).ok(),
+            Drive::Speed(_) => Some(0.0),
+        };
+        self.model.motors.iter().map(|motor| torque(&motor.drive)).collect()
+    }
+
+    /// Rates of the interpolated rates.
+    fn acceleration_at(&self, time: f64) -> Vec<f64> {
+        let (past, now) = (&self.state.history, self.state.time);
+        let mut ends = [vec![0.0; self.state.q.len()], vec![0.0; self.state.q.len()]];
+        let apart = DIFFERENCE * (now - past.past[0].time);
+        let order = past.past.len().min(self.state.control.order + 1);
+        for (at, values) in [time - apart, time + apart].into_iter().zip(&mut ends) {
+            past.extrapolate(order, (now, &self.state.velocity), |s| &s.velocity, at, values);
+        }
+        let [before, after] = ends;
+        after.iter().zip(&before).map(|(after, before)| (after - before) / (2.0 * apart)).collect()
+    }
+}

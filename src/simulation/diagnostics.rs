@@ -1,0 +1,164 @@
+//! What a state tells: energies, motor torques, force densities, gaps, the balance of forces and torques.
+
+use rayon::ThreadPool;
+
+use crate::Vec3;
+use crate::fluid::FluidModel;
+use crate::fluid::product::FarFieldChoice;
+use crate::forces::motors::Drive;
+use crate::linear::LinearError;
+use crate::model::contact::ContactModel;
+use crate::rod::configuration::node;
+use crate::signal::SignalError;
+use crate::simulation::Simulation;
+
+/// Nodes up to which a resistance matrix is formed although steps do without the mobility's: with it, its factors and
+/// the mobility 3.5 GB.
+const MOST_RESISTANCES: usize = 4000;
+
+impl Simulation {
+    /// Energies of stretching, bending and twisting, J.
+    pub fn energies(&mut self) -> [f64; 3] {
+        self.balance.energies(&self.model, &self.state).unwrap_or([f64::NAN; 3])
+    }
+
+    /// Elastic gradient and Hessian values on the model's pattern.
+    pub fn elastic_derivatives(&mut self) -> (Vec<f64>, Vec<f64>) {
+        self.balance.elastic(&self.model, &self.state)
+    }
+
+    /// Smallest gap between surfaces that may touch, m; `None` without contact.
+    pub fn smallest_gap(&mut self) -> Option<f64> {
+        match (self.model.contact.as_ref()?, &mut self.balance.barrier) {
+            (ContactModel::Barrier(law), Some(barrier)) => {
+                barrier.closest(law, self.model.network.node_dofs(), &self.state.q).map(|approach| approach.gap())
+            }
+            (ContactModel::SpillmannTeschner(law), _) => {
+                law.smallest_gap(&self.state.positions(&self.model.network)).map(|(gap, _)| gap)
+            }
+            _ => None,
+        }
+    }
+
+    /// Torque of every motor on its shaft, N m.
+    pub fn motor_torques(&mut self) -> Vec<f64> {
+        if self.balance.energies(&self.model, &self.state).is_none() {
+            return vec![f64::NAN; self.model.motors.len()];
+        }
+        let configuration = self.balance.configuration();
+        self.model
+            .motors
+            .iter()
+            .map(|motor| motor.torque(self.model.hinges.moments(motor.hinge, configuration)))
+            .collect()
+    }
+
+    /// Angular velocity of every motor over the last step, rad/s: the prescribed one, or that of the free angle.
+    ///
+    /// # Errors
+    /// What a motor's function of time fails with.
+    pub fn motor_speeds(&self) -> Result<Vec<f64>, SignalError> {
+        self.model
+            .motors
+            .iter()
+            .map(|motor| match &motor.drive {
+                Drive::Speed(signal) => signal.value(self.state.time),
+                Drive::Torque { dof, .. } => Ok(self.state.velocity[*dof]),
+            })
+            .collect()
+    }
+
+    /// Force per length on the fluid at every node (3N), N/m, for the present velocities; zero on dry nodes.
+    ///
+    /// # Errors
+    /// If the fluid's matrix is singular.
+    pub fn force_density(&mut self) -> Result<Vec<f64>, LinearError> {
+        if !self.state.density.is_empty() {
+            let mut out = vec![0.0; 3 * self.model.network.node_count()];
+            if let Some(fluid) = self.balance.fluid_mut() {
+                for (&node, value) in fluid.immersed().iter().zip(self.state.density.chunks_exact(3)) {
+                    out[3 * node..3 * node + 3].copy_from_slice(value);
+                }
+            }
+            return Ok(out);
+        }
+        self.with_fluid(|fluid, velocity, pool| fluid.force_density(velocity, pool))
+    }
+
+    /// Resistance of the nodes (3N x 3N, column-major), N s/m: the force that moves them through the fluid at given velocities.
+    ///
+    /// # Errors
+    /// If the fluid's matrix is singular, or [`LinearError::MatrixFree`] if the scene has more than 4000 nodes and
+    /// the far-field crossover lies below.
+    pub fn resistance(&mut self) -> Result<Vec<f64>, LinearError> {
+        let nodes = self.model.network.node_count();
+        let positions = self.state.positions(&self.model.network);
+        let mobility = self.balance.fluid_mut().and_then(FluidModel::nonlocal);
+        let mut stored = match mobility.is_some_and(|mobility| mobility.is_matrix_free()) {
+            true if nodes > MOST_RESISTANCES => {
+                let gigabytes = 72e-9 * (nodes * nodes) as f64;
+                return Err(LinearError::MatrixFree { what: "resistance", nodes, gigabytes });
+            }
+            true => self.model.fluid_with(Some(&FarFieldChoice::NEVER))?,
+            false => None,
+        };
+        if let Some(fluid) = &mut stored {
+            fluid.update(&positions, self.balance.threads.pool().as_deref())?;
+        } else {
+            let mut ignored = crate::step::statistics::Statistics::default();
+            self.balance.place_fluid(&positions, &mut ignored)?;
+            self.forget_fluid();
+        }
+        let mut out = vec![0.0; 9 * nodes * nodes];
+        let Some(fluid) = stored.as_deref_mut().or_else(|| self.balance.fluid_mut()) else {
+            return Ok(out);
+        };
+        let immersed = fluid.immersed().to_vec();
+        let mut column = vec![0.0; 3 * immersed.len()];
+        for (k, &source) in immersed.iter().enumerate() {
+            for c in 0..3 {
+                column.fill(0.0);
+                column[3 * k + c] = 1.0;
+                fluid.resist(&mut column, None)?;
+                let target = &mut out[(3 * source + c) * 3 * nodes..][..3 * nodes];
+                for (&node, force) in immersed.iter().zip(column.chunks_exact(3)) {
+                    target[3 * node..3 * node + 3].copy_from_slice(force);
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    fn with_fluid(
+        &mut self,
+        solve: impl FnOnce(&mut (dyn FluidModel + 'static), &mut [f64], Option<&ThreadPool>) -> Result<(), LinearError>,
+    ) -> Result<Vec<f64>, LinearError> {
+        let mut out = vec![0.0; 3 * self.model.network.node_count()];
+        let positions = self.state.positions(&self.model.network);
+        let mut ignored = crate::step::statistics::Statistics::default();
+        self.balance.place_fluid(&positions, &mut ignored)?;
+        self.forget_fluid();
+        let dofs = self.balance.fluid_dofs().to_vec();
+        let pool = self.balance.threads.pool();
+        let Some(fluid) = self.balance.fluid_mut() else {
+            return Ok(out);
+        };
+        let mut values: Vec<f64> =
+            dofs.iter().flat_map(|&dof| (0..3).map(move |c| dof + c)).map(|dof| self.state.velocity[dof]).collect();
+        solve(fluid, &mut values, pool.as_deref())?;
+        for (&node, value) in fluid.immersed().iter().zip(values.chunks_exact(3)) {
+            out[3 * node..3 * node + 3].copy_from_slice(value);
+        }
+        Ok(out)
+    }
+
+    /// Positions of the nodes, m.
+    pub fn positions(&self) -> Vec<Vec3> {
+        self.state.positions(&self.model.network)
+    }
+
+    /// Velocities of the nodes over the last step, m/s.
+    pub fn velocities(&self) -> Vec<Vec3> {
+        self.model.network.node_dofs().iter().map(|&dof| node(&self.state.velocity, dof)).collect()
+    }
+}
