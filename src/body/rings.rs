@@ -31,15 +31,18 @@ pub struct SurfacePoint {
 
 /// A profile, measured once.
 pub struct Rings {
-    points: Vec<ProfilePoint>,
+    profile: Box<dyn Profile>,
+    /// Parts of the way along the profile, and lengths of arc up to there, m.
+    parts: Vec<f64>,
     arc: Vec<f64>,
     reach: Vec<f64>,
 }
 
 impl Rings {
     /// Measures a profile.
-    pub fn new(profile: &dyn Profile) -> Self {
-        let points: Vec<ProfilePoint> = (0..=TABLE).map(|k| profile.point(k as f64 / TABLE as f64)).collect();
+    pub fn new(profile: Box<dyn Profile>) -> Self {
+        let parts: Vec<f64> = (0..=TABLE).map(|k| k as f64 / TABLE as f64).collect();
+        let points: Vec<ProfilePoint> = parts.iter().map(|&part| profile.point(part)).collect();
         let mut arc = vec![0.0];
         for pair in points.windows(2) {
             let step = (pair[1].radius - pair[0].radius).hypot(pair[1].height - pair[0].height);
@@ -49,7 +52,7 @@ impl Rings {
         let places: Vec<f64> = arc.iter().step_by(REACH_STRIDE).copied().collect();
         let known = reaches(&sparse);
         let reach = arc.iter().map(|&s| interpolate(&places, &known, s)).collect();
-        Self { points, arc, reach }
+        Self { profile, parts, arc, reach }
     }
 
     /// Points whose spacing is `fineness` times the reach of the surface, times `factor`.
@@ -65,13 +68,8 @@ impl Rings {
         let mut out = Vec::new();
         for ring in 0..rings {
             let s = interpolate(&counted, &self.arc, (ring as f64 + 0.5) * all / rings as f64);
-            let value = |part: &dyn Fn(&ProfilePoint) -> f64| {
-                let values: Vec<f64> = self.points.iter().map(part).collect();
-                interpolate(&self.arc, &values, s)
-            };
-            let (radius, height) = (value(&|p| p.radius), value(&|p| p.height));
-            let (across, along) = (value(&|p| p.normal[0]), value(&|p| p.normal[1]));
-            let size = across.hypot(along);
+            let ProfilePoint { radius, height, normal: [across, along] } =
+                self.profile.point(interpolate(&self.arc, &self.parts, s));
             let here = interpolate(&self.arc, &spacing, s);
             let reach = interpolate(&self.arc, &self.reach, s);
             let count = ((TAU * radius / here).round() as usize).max(FEWEST);
@@ -81,7 +79,7 @@ impl Rings {
                 let (sine, cosine) = (TAU * (k as f64 + turn) / count as f64).sin_cos();
                 SurfacePoint {
                     position: Vec3::new(radius * cosine, radius * sine, height),
-                    normal: Vec3::new(across * cosine, across * sine, along) / size,
+                    normal: Vec3::new(across * cosine, across * sine, along),
                     spacing: here,
                     reach,
                 }
@@ -119,13 +117,13 @@ mod tests {
     #[test]
     fn points_are_on_the_surface_and_cover_it() {
         let (a, c) = (1.0, 2.0);
-        let points = Rings::new(&Spheroid { equatorial: a, polar: c }).points(0.3, 1.0);
+        let points = Rings::new(Box::new(Spheroid { equatorial: a, polar: c })).points(0.3, 1.0);
         let mut area = 0.0;
         for point in &points {
             let p = &point.position;
-            assert!(((p.x * p.x + p.y * p.y) / (a * a) + p.z * p.z / (c * c) - 1.0).abs() < 1e-5);
+            assert!(((p.x * p.x + p.y * p.y) / (a * a) + p.z * p.z / (c * c) - 1.0).abs() < 1e-14);
             let gradient = Vec3::new(p.x / (a * a), p.y / (a * a), p.z / (c * c)).normalize();
-            assert!((gradient - point.normal).norm() < 1e-4);
+            assert!((gradient - point.normal).norm() < 1e-14);
             area += point.spacing * point.spacing;
         }
         // 2 pi a^2 (1 + c / (a e) asin e), with the eccentricity e.
