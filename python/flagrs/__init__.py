@@ -9,6 +9,7 @@ from flagrs.guards import (
     MeshWarning,
     ReynoldsWarning,
     StabilityWarning,
+    StationarityWarning,
     StepWarning,
     StrainWarning,
 )
@@ -66,6 +67,7 @@ __all__ = [
     "SceneError",
     "Simulation",
     "StabilityWarning",
+    "StationarityWarning",
     "StepWarning",
     "StrainWarning",
     "Suggestion",

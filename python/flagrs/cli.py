@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table as TextTable
 
 from flagrs import scenarios
+from flagrs.commands.measure import measure
 from flagrs.commands.view import view
 from flagrs.errors import FileError, FlagrsError, SceneError, file_error, not_allowed
 from flagrs.progress import ProgressBar
@@ -32,7 +33,8 @@ app = typer.Typer(
     rich_markup_mode=None,  # it takes units in brackets for markup
 )
 
-app.command()(view)
+for command in (measure, view):
+    app.command()(command)
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
 BAD_INPUT, FAILED = 2, 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -18,9 +19,12 @@ from flagrs.flow import flow_of, immersed_edges
 from flagrs.fluid import hat_weights
 from flagrs.force_density import ForceDensity
 from flagrs.frame import shapes_of
-from flagrs.guards import Notice, notices
+from flagrs.guards import Notice, StationarityWarning, notices
 from flagrs.measures import along, angle_about, slope, spin_about, window
+from flagrs.results.bundle import Bundle, bundle_of
 from flagrs.results.material_frames import directors
+from flagrs.results.readouts import ReadOuts, readouts_of
+from flagrs.results.swimming import Swimming, swimming_of
 from flagrs.scene import Head, Motor, Scene, Table, codec
 from flagrs.scene.rod_topology import edges_at_nodes, far_end
 from flagrs.scene.scene_checks import edges_of_head
@@ -347,6 +351,62 @@ class Trajectory:
         """
         chosen = np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64)
         return directors(self.scene, self.time, self.nodes, self.theta, chosen, self._contents.state)
+
+    def swimming(self, start: float | None = None, end: float | None = None) -> Swimming:
+        """Return the swimming velocity with its uncertainty, in the laboratory and along the swimmer's axis.
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run. A `flagrs.StationarityWarning` says if the
+            velocity has a trend over it.
+
+        Raises
+        ------
+        FlagrsError
+            If fewer than nine frames lie in the window, or clamps hold filaments and there is no head.
+        """
+        found = swimming_of(self, start, end)
+        if not found.stationary:
+            warnings.warn(
+                f"the swimming velocity is not steady from {found.start:g} s to {found.end:g} s; "
+                "take a later window (start=), or run on",
+                StationarityWarning,
+                stacklevel=2,
+            )
+        return found
+
+    def readouts(self, start: float | None = None, end: float | None = None) -> ReadOuts:
+        """Return everything that is read off the run in single numbers, with units and errors; print it.
+
+        What means nothing for the scene is there without a value, and says why.
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run.
+
+        Raises
+        ------
+        FlagrsError
+            If fewer than two frames lie in the window.
+        """
+        return readouts_of(self, start, end)
+
+    def bundle(self, frames: Any = None) -> Bundle:
+        """Return the filaments, measured together: gaps, phases, tips, twist, writhe, linking.
+
+        Parameters
+        ----------
+        frames
+            Indices (F,) of the frames, in increasing order; None: all.
+
+        Raises
+        ------
+        FlagrsError
+            If the scene has no immersed filament.
+        """
+        return bundle_of(self, np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64))
 
     def view(self, **options: Any) -> View:
         """Return the run in three dimensions, for a notebook or a page to `save`; see `flagrs.view.view`."""

@@ -3,6 +3,7 @@
 //! * [`lanes`]: vectors of numbers on every machine's instructions, chosen at run time (all `unsafe` of the crate).
 //! * [`segment`]: integrals of a regularized Stokeslet over a straight segment.
 //! * [`stokeslet`]: mobility matrix, velocity field and hat-function weights of segment networks.
+//! * [`kernel`]: what walls and surfaces add to it.
 //! * [`far_field`]: the mobility's product with a force density in time proportional to the number of nodes.
 //! * [`product`]: with a stored matrix or without, by the number of nodes.
 //! * [`rss`]: nonlocal drag by regularized Stokeslet segments.
@@ -14,6 +15,7 @@
 pub mod ambient;
 pub mod far_field;
 pub mod head;
+pub mod kernel;
 pub mod lanes;
 pub mod product;
 pub mod rft;

@@ -447,12 +447,12 @@ fn lost<T: Copy + Add<Output = T> + Sub<Output = T>>(a: T, b: T, difference: T) 
 }
 
 #[inline(always)]
-fn splat<L: Lanes>(v: &[f64; 3]) -> [L; 3] {
+pub(crate) fn splat<L: Lanes>(v: &[f64; 3]) -> [L; 3] {
     [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])]
 }
 
 #[inline(always)]
-fn minus<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+pub(crate) fn minus<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
@@ -463,12 +463,12 @@ fn scaled<L: Lanes>(a: [L; 3], factor: L) -> [L; 3] {
 
 /// `a + factor b`.
 #[inline(always)]
-fn add_scaled<L: Lanes>(a: [L; 3], factor: L, b: [L; 3]) -> [L; 3] {
+pub(crate) fn add_scaled<L: Lanes>(a: [L; 3], factor: L, b: [L; 3]) -> [L; 3] {
     [factor.mul_add(b[0], a[0]), factor.mul_add(b[1], a[1]), factor.mul_add(b[2], a[2])]
 }
 
 #[inline(always)]
-fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
+pub(crate) fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
 

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
-use crate::bdf::control::Control;
+use crate::bdf::control::{Control, NO_CEILING};
 use crate::bdf::history::{History, Sample};
 use crate::rod::reference::ReferenceFrames;
 use crate::simulation as core;
@@ -405,7 +405,7 @@ fn control(saved: &StateInput<'_>) -> Control {
     Control {
         dt: first(&saved.control_step),
         order: whole(&saved.control_order),
-        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).unwrap_or(f64::INFINITY),
+        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).map_or(NO_CEILING, |ceiling| ceiling.min(NO_CEILING)),
         at_jump: number(2).is_some_and(|flag| flag != 0.0),
     }
 }

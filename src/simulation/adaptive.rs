@@ -12,6 +12,8 @@ use crate::simulation::failure::{StepError, TryError};
 /// First adaptive step and smallest one, in steps of fixed size.
 const FIRST_STEP: f64 = 1e-2;
 const SMALLEST_STEP: f64 = 1e-13;
+/// Longest adaptive step, in steps of fixed size: where nothing moves, nothing else bounds it.
+pub(super) const LONGEST_STEP: f64 = 1e9;
 /// Length of a step over which nothing but jumps happens, in steps of fixed size and in what is left of the run.
 const INSTANT: f64 = 1e-9;
 /// Rejections at a time before past states are given up.

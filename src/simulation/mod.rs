@@ -29,6 +29,7 @@ use crate::nonlinear::continuation::Continuation;
 use crate::nonlinear::newton::{self, Goal, NewtonSettings, NewtonWork};
 use crate::runtime::interrupt::Hook;
 use crate::runtime::threads::Threads;
+use crate::simulation::adaptive::LONGEST_STEP;
 use crate::simulation::failure::{StepError, TryError};
 use crate::simulation::progress::Progress;
 use crate::state::State;
@@ -322,6 +323,7 @@ impl Simulation {
             let highest_order = if self.force.is_some() { 1 } else { self.scheme.highest_order() };
             let estimate = Estimate { missed: &missed, unseen, tolerance, highest_order };
             (self.state.control, accepted) = control.judge(&times, t1, &estimate);
+            self.state.control.dt = self.state.control.dt.min(LONGEST_STEP * self.dt);
         }
         if accepted {
             self.accept(drives, dt, order, &missed)?;
