@@ -117,6 +117,12 @@ impl Surface {
         multiply(&self.fit, 3 * self.sources.len(), velocity)
     }
 
+    /// Forces of the sources on the fluid, N, as the body moves with `(U, Omega)` in m/s and rad/s, in a fluid of the given viscosity (Pa s).
+    pub fn forces(&self, motion: &Vector6<f64>, viscosity: f64) -> Vec<Vec3> {
+        let strengths = self.strengths(&velocities(motion, &self.points));
+        strengths.chunks_exact(3).map(|g| 8.0 * PI * viscosity * Vec3::new(g[0], g[1], g[2])).collect()
+    }
+
     /// The resistance of the body about its centre in a fluid of the given viscosity (Pa s): force and torque on the fluid, in N and N m,
     /// by `(U, Omega)` in m/s and rad/s.
     pub fn resistance(&self, viscosity: f64) -> Matrix6<f64> {
