@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from flagrs import _flagrs
+from flagrs.body_surface import BodySurface
 from flagrs.errors import SceneError
 from flagrs.force_density import check_edges
 from flagrs.memory import require_memory
@@ -15,7 +16,7 @@ from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
 from flagrs.threads import thread_count
 
-__all__ = ["FastMobility", "hat_weights", "mobility", "velocity"]
+__all__ = ["BodySurface", "FastMobility", "hat_weights", "mobility", "velocity"]
 
 
 def mobility(
