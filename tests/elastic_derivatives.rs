@@ -90,7 +90,8 @@ fn check(specification: Specification, random: &mut Random, displacement: f64, m
     let scale = gradient.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
     let hessian_scale = hessian.iter().flatten().fold(0.0_f64, |m, g| m.max(g.abs()));
     for dof in 0..q.len() {
-        let energy = difference(&mut sim, &q, dof, 2e-3, &mut |sim| vec![sim.energies().iter().map(|(_, energy)| energy).sum()]);
+        let energy =
+            difference(&mut sim, &q, dof, 2e-3, &mut |sim| vec![sim.energies().iter().map(|(_, energy)| energy).sum()]);
         let error = (energy[0] - gradient[dof]).abs() / scale;
         assert!(error < 1e-8, "gradient of dof {dof}: {} against {}, relative {error:.1e}", gradient[dof], energy[0]);
         let column =
