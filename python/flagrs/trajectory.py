@@ -158,6 +158,12 @@ class Trajectory:
         until = f", 0 to {self.time[-1]:g} s" if len(self) else ""
         return f"Trajectory({self.scene.name}: {len(self)} frames of {self.nodes.shape[1]} nodes{until})"
 
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        from flagrs.notebook import trajectory_html  # it reads trajectories, so it is above this module
+
+        return trajectory_html(self)
+
     def swimming_speed(self, start: float | None = None, end: float | None = None) -> float:
         """Return the speed of the head node, or of the mean of all nodes in a scene without a head [m/s].
 

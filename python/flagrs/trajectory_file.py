@@ -183,7 +183,7 @@ def read_as(path: Path, lazy: bool | None) -> Contents:
     if lazy is None:
         try:
             lazy = path.stat().st_size >= LAZY_BYTES
-        except OSError:
+        except (OSError, ValueError):
             lazy = False  # `read` says what is wrong
     return read_lazily(path) if lazy else read(path)
 
