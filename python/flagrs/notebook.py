@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flagrs.scene.part import different
 from flagrs.scene.values import FloatArray
 
 if TYPE_CHECKING:
+    from flagrs.scene.part import Part
     from flagrs.scene.plan import Plan
     from flagrs.scene.scene import Scene
     from flagrs.trajectory import Trajectory
@@ -80,9 +82,22 @@ def _range(values: FloatArray) -> str:
     return f"{low:.3g} m" if low == high else f"{low:.3g} to {high:.3g} m"
 
 
-def _short(part: object) -> str:
-    text = repr(part)
-    return text if len(text) <= 160 else text[:157] + "..."
+def _short(part: Part) -> str:
+    """Return a part with those of its fields that differ from their defaults."""
+    plain = {
+        name: field.get_default(call_default_factory=True) for name, field in type(part).model_fields.items()
+    }
+    told = [
+        f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={_shown(value)}"
+        for name, value in ((name, getattr(part, name)) for name in plain)
+        if different(value, plain[name])
+    ]
+    text = f"{type(part).__name__}({', '.join(told)})"
+    return text if len(text) <= 240 else text[:237] + "..."
+
+
+def _shown(value: object) -> str:
+    return f"array{value.shape}" if isinstance(value, np.ndarray) and value.size > 4 else repr(value)
 
 
 def _view(scene: Scene, plane: tuple[int, int]) -> str:

@@ -6,7 +6,7 @@ import inspect
 import re
 from collections.abc import Callable
 from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
@@ -88,6 +88,8 @@ def _shape(name: str) -> Schema:
 
 def _value(kind: Any, parts: dict[str, Schema]) -> Schema:
     """Return the schema of a value of a type, as far as a file can hold it."""
+    if get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
     origin = get_origin(kind)
     if origin in (Union, UnionType):
         choices: list[Schema] = []
@@ -95,7 +97,7 @@ def _value(kind: Any, parts: dict[str, Schema]) -> Schema:
             found = _value(choice, parts)
             if choice is not NoneType and found and found not in choices:
                 choices.append(found)
-        return choices[0] if len(choices) == 1 else {"anyOf": choices}
+        return {"anyOf": choices} if len(choices) > 1 else (choices or [{}])[0]
     if origin is Literal:
         return {"enum": list(get_args(kind))}
     if origin is tuple:
