@@ -22,8 +22,11 @@ if TYPE_CHECKING:
         StrainWarning,
     )
     from flagrs.scene import (
+        Capsule,
         Clamp,
         Contact,
+        Cylinder,
+        Ellipsoid,
         FlowFunction,
         Fluid,
         Head,
@@ -37,6 +40,7 @@ if TYPE_CHECKING:
         Rod,
         Rotation,
         Scene,
+        Sphere,
         Table,
         TimeFunction,
     )
@@ -74,8 +78,11 @@ _PLACES = {
         "StrainWarning",
     ),
     "flagrs.scene": (
+        "Capsule",
         "Clamp",
         "Contact",
+        "Cylinder",
+        "Ellipsoid",
         "FlowFunction",
         "Fluid",
         "Head",
@@ -89,6 +96,7 @@ _PLACES = {
         "Rod",
         "Rotation",
         "Scene",
+        "Sphere",
         "Table",
         "TimeFunction",
     ),
@@ -103,10 +111,13 @@ _PLACES = {
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 
 __all__ = [
+    "Capsule",
     "Clamp",
     "Contact",
     "ContactWarning",
     "ConvergenceError",
+    "Cylinder",
+    "Ellipsoid",
     "EnergyWarning",
     "FileError",
     "FlagrsError",
@@ -128,6 +139,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
+    "Sphere",
     "StabilityWarning",
     "StationarityWarning",
     "StepWarning",
