@@ -283,7 +283,7 @@ def _report(done: Run, path: Path) -> str:
 
 
 def _certainty(trajectory: Trajectory) -> str:
-    """Return the standard error of the speed in words, as far as it is known, and whether it still changes."""
+    """Return the standard error of the speed in words, where it is known, and whether it still changes."""
     from flagrs.results.swimming import swimming_of
 
     try:
