@@ -345,7 +345,7 @@ impl Simulation {
         }
         let (drives, departure, impulses, load_impulses) = solved?;
         self.check_reach()?;
-        let missed = self.state.history.prediction_errors(
+        let prediction_errors = self.state.history.prediction_errors(
             (t0, &self.state.q),
             (t1, &self.trial.q),
             &self.model.error_weight,
@@ -355,20 +355,20 @@ impl Simulation {
         if let Some(tolerance) = self.tolerance {
             let times = self.state.history.times(t0, usize::MAX);
             let control = Control { order, ..self.state.control };
-            let mut unseen = departure / self.angle_tolerance() * tolerance;
+            let mut input_error = departure / self.angle_tolerance() * tolerance;
             for (dof, impulse) in impulses {
-                unseen = unseen.max(self.solver.response(&self.model, dof)? * impulse / dt);
+                input_error = input_error.max(self.solver.response(&self.model, dof)? * impulse / dt);
             }
             for (channel, impulse) in load_impulses {
-                unseen = unseen.max(self.solver.response_to_load(&self.model, t1, channel)? * impulse / dt);
+                input_error = input_error.max(self.solver.response_to_load(&self.model, t1, channel)? * impulse / dt);
             }
             let highest_order = if self.force.is_some() { 1 } else { self.scheme.highest_order() };
-            let estimate = Estimate { missed: &missed, unseen, tolerance, highest_order };
+            let estimate = Estimate { prediction_errors: &prediction_errors, input_error, tolerance, highest_order };
             (self.state.control, accepted) = control.judge(&times, t1, &estimate);
             self.state.control.dt = self.state.control.dt.min(LONGEST_STEP * self.dt);
         }
         if accepted {
-            self.accept(drives, dt, order, &missed)?;
+            self.accept(drives, dt, order, &prediction_errors)?;
         }
         Ok(accepted)
     }
@@ -480,7 +480,7 @@ impl Simulation {
         }
     }
 
-    fn accept(&mut self, drives: Drives, dt: f64, order: usize, missed: &[f64]) -> Result<(), TryError> {
+    fn accept(&mut self, drives: Drives, dt: f64, order: usize, prediction_errors: &[f64]) -> Result<(), TryError> {
         let step = Step::new(self.scheme, &self.state, dt, order, drives);
         let increment = step.increment();
         let velocity: Vec<f64> =
@@ -514,7 +514,7 @@ impl Simulation {
             density: std::mem::replace(&mut state.density, self.trial.density.clone()),
         };
         state.tensions.copy_from_slice(&self.trial.tensions);
-        state.history.accept(replaced, missed);
+        state.history.accept(replaced, prediction_errors);
         self.solver.at.configuration.accept(&mut state.frames);
         state.time += dt;
         state.steps += 1;
