@@ -26,6 +26,9 @@
 //!   inputs <- step <- simulation <- python`.
 //! * [`simulation::Simulation`] is the way in.
 
+#[cfg(test)]
+extern crate self as flagrs;
+
 pub mod bdf;
 pub mod body;
 pub mod contact;
