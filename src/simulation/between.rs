@@ -14,6 +14,8 @@ use crate::step::statistics::Statistics;
 const MOST_CORRECTIONS: usize = 10;
 const SETTLED: f64 = 1e-4;
 const GOOD: f64 = 1e-2;
+/// Relative residual that their linear systems may leave.
+const LINEAR: f64 = 1e-3;
 /// Part of the last step over which the interpolated velocity is differenced to an acceleration.
 const DIFFERENCE: f64 = 1e-3;
 
@@ -34,7 +36,6 @@ impl Simulation {
             if configuration.update(&self.model.network, &state.q, &state.frames, &shafts) {
                 configuration.accept(&mut state.frames);
                 self.settle(&mut state);
-                self.forget_fluid();
             }
         }
         Ok(state)
@@ -66,8 +67,31 @@ impl Simulation {
         Ok(state)
     }
 
-    /// Brings an interpolated state into balance, the forces on the fluid being what they are up to the change of rates. Without
-    /// success it stays as it is.
+    /// Shows `look` the present state, brought into the balance of forces where steps of adaptive size have only found positions: its
+    /// tensions, torques and forces on the fluid are then those of that balance. The state itself stays as it is.
+    ///
+    /// # Errors
+    /// As [`Self::state_at`].
+    pub fn balanced<R>(&mut self, look: impl FnOnce(&mut Self) -> R) -> Result<R, StepError> {
+        if self.tolerance.is_none() {
+            return Ok(look(self));
+        }
+        let state = self.state_at(self.state.time)?;
+        Ok(self.look_at(state, look))
+    }
+
+    /// Shows `look` another state in place of the present one.
+    pub fn look_at<R>(&mut self, state: State, look: impl FnOnce(&mut Self) -> R) -> R {
+        let present = std::mem::replace(&mut self.state, state);
+        self.anchor_contact();
+        let seen = look(self);
+        self.state = present;
+        self.anchor_contact();
+        seen
+    }
+
+    /// Brings an interpolated state into balance, with the fluid's equation at its own geometry: nothing that earlier steps have left
+    /// behind may matter, or runs that go on from a file would show other frames. Without success it stays as it is.
     fn settle(&mut self, state: &mut State) {
         let Goal::Displacement(goal) = self.settings.goal else { return };
         if self.force.is_some() {
@@ -103,21 +127,21 @@ impl Simulation {
         }
     }
 
-    /// Newton's method on the balance of forces, but for the fluid's equation, which needs the fluid's matrix there.
+    /// Newton's method on the balance of forces.
     fn correct(&mut self, step: &Step, found: &mut Unknowns, goal: f64) -> Option<()> {
         let Self { model, balance, .. } = self;
         let mut uncounted = Statistics::default();
-        if balance.fluid_mut().is_some_and(|fluid| fluid.is_local()) {
-            balance.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
-        }
+        self.fluid_step = None;
+        balance.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
         balance.begin(model, step, &mut uncounted).ok()?;
+        balance.aim(model, step, Goal::Displacement(goal), &found.q);
         let (mut direction, mut left) = (found.clone(), f64::INFINITY);
         for _ in 0..MOST_CORRECTIONS {
             balance.evaluate(model, step, found, &mut uncounted)?;
-            balance.forget_slip();
+            balance.weigh(model);
             balance.linearize(model, step, &found.tensions, &mut uncounted).ok()?;
             left = balance.correction(model, step, goal, &mut uncounted).ok()?.length;
-            balance.last_correction(model, step, &found.tensions, &mut direction).ok()?;
+            balance.direction(model, step, &found.tensions, LINEAR, &mut direction, &mut uncounted).ok()?;
             let from = found.q.clone();
             let parts = [(&mut found.q, &direction.q), (&mut found.density, &direction.density)];
             for (value, change) in parts.into_iter().chain([(&mut found.tensions, &direction.tensions)]) {

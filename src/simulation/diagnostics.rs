@@ -7,6 +7,7 @@ use crate::fluid::FluidModel;
 use crate::fluid::product::FarFieldChoice;
 use crate::forces::motors::Drive;
 use crate::linear::LinearError;
+use crate::model::Model;
 use crate::model::contact::ContactModel;
 use crate::rod::configuration::node;
 use crate::signal::SignalError;
@@ -15,6 +16,9 @@ use crate::simulation::Simulation;
 /// Nodes up to which a resistance matrix is formed although steps do without the mobility's: with it, its factors and
 /// the mobility 3.5 GB.
 const MOST_RESISTANCES: usize = 4000;
+
+/// Distance, in sizes of a filament, within which a node stands on an edge.
+const COINCIDENT: f64 = 1e-7;
 
 impl Simulation {
     /// Energies of stretching, bending and twisting, J.
@@ -150,6 +154,24 @@ impl Simulation {
             out[3 * node..3 * node + 3].copy_from_slice(value);
         }
         Ok(out)
+    }
+
+    /// An immersed node that stands on an edge it is no end of, to a ten-millionth of the size of its filament, and that edge.
+    pub(crate) fn coincidence(&self) -> Option<[usize; 2]> {
+        let Model { network, error_weight, .. } = &self.model;
+        let positions = self.positions();
+        self.balance.fluid.as_ref()?.immersed().iter().find_map(|&point| {
+            let reach = COINCIDENT / error_weight[network.node_dofs()[point]];
+            let on = |&(_, &[a, b]): &(usize, &[usize; 2])| {
+                if a == point || b == point {
+                    return false;
+                }
+                let (along, arm) = (positions[b] - positions[a], positions[point] - positions[a]);
+                let part = (arm.dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+                (arm - along * part).norm() < reach
+            };
+            network.edges().iter().enumerate().find(on).map(|(edge, _)| [point, edge])
+        })
     }
 
     /// Positions of the nodes, m.

@@ -156,13 +156,19 @@ impl Simulation {
 
     /// Goes back to a state from which steps were tried: the work that they took still counts.
     pub(crate) fn go_back(&mut self, state: State) {
-        if let (Some(law), Some(barrier)) = (self.model.barrier(), &mut self.balance.barrier) {
-            let positions = state.positions(&self.model.network);
-            barrier.ensure_at(law, if state.contact_anchor.is_empty() { &positions } else { &state.contact_anchor });
-        }
         self.state = state;
+        self.anchor_contact();
         self.fluid_step = None;
         self.given = None;
+    }
+
+    /// Lets barrier contact list its near pairs where the state has them listed.
+    pub(crate) fn anchor_contact(&mut self) {
+        let Self { model, state, balance, .. } = self;
+        if let (Some(law), Some(barrier)) = (model.barrier(), &mut balance.barrier) {
+            let positions = state.positions(&model.network);
+            barrier.ensure_at(law, if state.contact_anchor.is_empty() { &positions } else { &state.contact_anchor });
+        }
     }
 
     /// As [`Self::restore`], for a state from elsewhere.
@@ -278,7 +284,13 @@ impl Simulation {
             iterations,
             smallest_gap,
             worst_node: worst.map(|worst| dofs.partition_point(|&dof| dof <= worst).saturating_sub(1)),
-            reason: format!("{reason}; {advice}"),
+            reason: match self.coincidence().filter(|_| reason.contains("singular")) {
+                Some([node, edge]) => format!(
+                    "{reason}; node {node} stands on edge {edge}, where the fluid cannot tell their forces apart: move it away by a \
+                     millionth of its filament's size or more, or join the two in one rod"
+                ),
+                None => format!("{reason}; {advice}"),
+            },
         }
     }
 

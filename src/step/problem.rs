@@ -361,11 +361,6 @@ impl Balance {
         self.configuration.update(&model.network, q, &step.state.frames, &self.shafts)
     }
 
-    /// Takes the fluid's equation for solved.
-    pub fn forget_slip(&mut self) {
-        self.slip.fill(0.0);
-    }
-
     /// Residual at a trial; `None` if it is not a configuration.
     pub fn evaluate(
         &mut self,
