@@ -14,8 +14,11 @@ from flagrs.guards import (
     StrainWarning,
 )
 from flagrs.scene import (
+    Capsule,
     Clamp,
     Contact,
+    Cylinder,
+    Ellipsoid,
     FlowFunction,
     Fluid,
     Head,
@@ -29,6 +32,7 @@ from flagrs.scene import (
     Rod,
     Rotation,
     Scene,
+    Sphere,
     Table,
     TimeFunction,
 )
@@ -41,10 +45,13 @@ from flagrs.version import installed_version
 __version__ = installed_version()
 
 __all__ = [
+    "Capsule",
     "Clamp",
     "Contact",
     "ContactWarning",
     "ConvergenceError",
+    "Cylinder",
+    "Ellipsoid",
     "EnergyWarning",
     "FileError",
     "FlagrsError",
@@ -66,6 +73,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
+    "Sphere",
     "StabilityWarning",
     "StationarityWarning",
     "StepWarning",
