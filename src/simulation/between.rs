@@ -2,11 +2,12 @@
 
 use crate::forces::motors::{Drive, Motor};
 use crate::model::contact::ContactModel;
-use crate::nonlinear::equations::Goal;
+use crate::nonlinear::equations::{Equations, Goal};
 use crate::signal::Signal;
 use crate::simulation::Simulation;
 use crate::simulation::failure::StepError;
 use crate::state::State;
+use crate::step::equations::StepEquations;
 use crate::step::problem::{Step, Unknowns};
 use crate::step::statistics::Statistics;
 
@@ -139,27 +140,26 @@ impl Simulation {
         self.fluid_step = None;
         balance.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
         balance.begin(model, step, &mut uncounted).ok()?;
-        balance.aim(model, step, Goal::Displacement(goal), &found.q);
+        let mut equations = StepEquations { balance, model, step, statistics: &mut uncounted };
+        equations.aim(Goal::Correction(goal), found);
         let (mut direction, mut left) = (found.clone(), f64::INFINITY);
         for _ in 0..MOST_CORRECTIONS {
-            balance.evaluate(model, step, found, &mut uncounted)?;
-            balance.weigh(model);
-            balance.linearize(model, step, &found.tensions, &mut uncounted).ok()?;
-            left = balance.correction(model, step, goal, &mut uncounted).ok()?.length;
-            balance.direction(model, step, &found.tensions, LINEAR, &mut direction, &mut uncounted).ok()?;
-            let from = found.q.clone();
-            let parts = [(&mut found.q, &direction.q), (&mut found.density, &direction.density)];
-            for (value, change) in parts.into_iter().chain([(&mut found.tensions, &direction.tensions)]) {
-                value.iter_mut().zip(change).for_each(|(value, change)| *value += change);
-            }
-            if balance.step_limit(model, &from, &found.q, &mut uncounted) < 1.0 {
+            equations.evaluate(found)?;
+            equations.weigh();
+            equations.linearize(found).ok()?;
+            // What friction still has to slide does not count: a contact that sticks shows the stresses that it has.
+            left = equations.balance.correction(equations.model, step, goal, equations.statistics).ok()?.length;
+            equations.direction(found, LINEAR, &mut direction).ok()?;
+            let from = found.clone();
+            equations.advance(&from, &direction, 1.0, found);
+            if equations.longest_step(&from, found) < 1.0 {
                 return None;
             }
             if left <= SETTLED * goal {
                 break;
             }
         }
-        (left <= GOOD * goal && balance.place(model, step, &found.q)).then_some(())
+        (left <= GOOD * goal && equations.place(found)).then_some(())
     }
 
     /// Torques of torque-driven motors, N m, unless one of their functions fails.

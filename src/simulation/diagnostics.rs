@@ -159,7 +159,7 @@ impl Simulation {
 
     /// An immersed node that stands on an edge it is no end of, to a ten-millionth of the size of its filament, and that edge.
     pub(crate) fn coincidence(&self) -> Option<[usize; 2]> {
-        let Model { network, error_weight, .. } = &self.model;
+        let Model { network, error_weight, .. } = &*self.model;
         let positions = self.positions();
         self.balance.fluid.as_ref()?.immersed().iter().find_map(|&point| {
             let reach = COINCIDENT / error_weight[network.node_dofs()[point]];
