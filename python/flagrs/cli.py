@@ -16,6 +16,7 @@ from flagrs import scenarios
 from flagrs.commands.export import export
 from flagrs.commands.measure import measure
 from flagrs.commands.movie import movie
+from flagrs.commands.new import new, schema
 from flagrs.commands.plot import check_image, draw, plot
 from flagrs.commands.view import view
 from flagrs.errors import FlagrsError, SceneError
@@ -23,7 +24,7 @@ from flagrs.progress import ProgressBar
 from flagrs.runs import Run, RunSettings, measured, run_to_file
 from flagrs.scene import Scene, toml
 from flagrs.step_choice import steps_in_words
-from flagrs.suggest import suggest
+from flagrs.suggestion import suggest
 from flagrs.trajectory import Trajectory
 from flagrs.units import rpm
 from flagrs.version import installed_version
@@ -36,7 +37,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # it takes units in brackets for markup
 )
 
-for command in (plot, view, movie, measure, export):
+for command in (plot, view, movie, measure, export, new, schema):
     app.command()(command)
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.

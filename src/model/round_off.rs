@@ -5,7 +5,6 @@ use crate::model::Model;
 use crate::model::specification::Specification;
 use crate::rod::configuration::node;
 use crate::rod::network::Network;
-use crate::step::problem::Step;
 
 /// Rounding errors gathered over those of single numbers.
 const GATHERED: f64 = 2.0;
@@ -70,9 +69,16 @@ impl RoundOff {
         all
     }
 
-    /// Round-off of every force (moments over the mean edge) in a step from the degrees of freedom `q`, N; `drag` is the resistance
-    /// of every degree of freedom to moving by itself, N s/m.
-    pub fn floors(&self, model: &Model, step: &Step, drag: &[f64], q: &[f64], out: &mut Vec<f64>) {
+    /// Round-off of every force (moments over the mean edge) in a step from the degrees of freedom `q`, N; rates change by `rate` of
+    /// displacements, their rates by `inertia`; `drag` is the resistance of every degree of freedom to moving by itself, N s/m, `twists` the reference twist of every hinge.
+    pub fn floors(
+        &self,
+        model: &Model,
+        (rate, inertia): (f64, f64),
+        (drag, twists): (&[f64], &[f64]),
+        q: &[f64],
+        out: &mut Vec<f64>,
+    ) {
         let of_dof = model.filaments.of_dof();
         let mut positional = vec![false; q.len()];
         model.network.node_dofs().iter().for_each(|&dof| positional[dof..dof + 3].fill(true));
@@ -83,21 +89,20 @@ impl RoundOff {
             let largest = if positional[dof] { &mut farthest } else { &mut turned };
             largest[of_dof[dof]] = largest[of_dof[dof]].max(value.abs());
         }
-        let hinges = self.hinges(model, step, (&farthest, &turned), q);
-        let inertia = if step.scheme.has_inertia() { step.rate * step.rate } else { 0.0 };
+        let hinges = self.hinges(model, twists, (&farthest, &turned), q);
         out.clear();
         out.extend((0..q.len()).map(|dof| {
             let (x, theta) = (farthest[of_dof[dof]], turned[of_dof[dof]]);
-            let own = (model.mass[dof] * inertia + drag[dof] * step.rate) * if positional[dof] { x } else { theta };
+            let own = (model.mass[dof] * inertia + drag[dof] * rate) * if positional[dof] { x } else { theta };
             let elastic = self.constant[dof] + self.position[dof] * x + hinges[dof];
-            let spin = self.spin[dof] * step.rate * theta;
+            let spin = self.spin[dof] * rate * theta;
             GATHERED * f64::EPSILON * (elastic + spin + own) * model.force_weight[dof]
         }));
     }
 
     /// What the stiffness of hinges multiplies the round-off of unity by, in the residual of every degree of freedom, N or N m; `farthest`
     /// and `turned` are the largest coordinate and angle of every filament.
-    fn hinges(&self, model: &Model, step: &Step, (farthest, turned): (&[f64], &[f64]), q: &[f64]) -> Vec<f64> {
+    fn hinges(&self, model: &Model, twists: &[f64], (farthest, turned): (&[f64], &[f64]), q: &[f64]) -> Vec<f64> {
         let (network, of_dof) = (&model.network, model.filaments.of_dof());
         let mut out = vec![0.0; q.len()];
         for (k, (joint, hinge)) in self.joints.iter().zip(network.hinges()).enumerate() {
@@ -108,7 +113,7 @@ impl RoundOff {
             let bent = e.cross(&f).norm() / (e.norm() * f.norm() + e.dot(&f));
             let bent = bent.max(0.5 * model.hinges.natural_curvature(k)).clamp(LEAST_BENT, 1.0);
             let angles = hinge.edges.map(|edge| q[network.edge_dofs()[edge]]);
-            let twist = hinge.signs[1] * angles[1] - hinge.signs[0] * angles[0] + step.state.frames.twists[k];
+            let twist = hinge.signs[1] * angles[1] - hinge.signs[0] * angles[0] + twists[k];
             let strained = if driven { 1.0 } else { (twist - model.hinges.natural_twist(k)).abs().min(1.0) };
             let filament = of_dof[network.node_dofs()[hinge.nodes[1]]];
             let (x, theta) = (farthest[filament] / shortest, turned[filament]);

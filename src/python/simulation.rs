@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::arrays::{from_flat, from_points, points, values};
-use super::errors::{linear_error, model_error, scene_error, step_error};
+use super::errors::{linear_error, model_error, scene_error, step_error, term_error};
 use super::specification::SceneInput;
 use crate::bdf::control::{Control, NO_CEILING};
 use crate::bdf::history::{History, Sample};
@@ -17,6 +17,9 @@ use crate::simulation::failure::StepError;
 use crate::state::State;
 use crate::state::account::Account;
 use crate::step::scheme::Scheme;
+
+/// The energies that frames hold, in their order.
+const ELASTIC: [&str; 3] = ["stretching", "bending", "twisting"];
 
 /// A running simulation; the class `flagrs.Simulation` wraps it.
 #[pyclass(module = "flagrs._flagrs")]
@@ -192,22 +195,27 @@ impl Simulation {
         self.inner.place(&nodes, theta.as_deref()).map_err(|error| model_error(py, &error))
     }
 
-    /// Energies of stretching, bending and twisting, J.
-    fn energies(&mut self, py: Python<'_>) -> PyResult<[f64; 3]> {
-        self.inner.balanced(core::Simulation::energies).map_err(|error| step_error(py, error))
+    /// Energies of all terms that have one, J, by name.
+    fn energies<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let energies = PyDict::new(py);
+        for (name, energy) in self.inner.balanced(core::Simulation::energies).map_err(|error| step_error(py, error))? {
+            energies.set_item(name, energy)?;
+        }
+        Ok(energies)
     }
 
     /// Elastic gradient, (ndof,).
-    fn gradient<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.inner.elastic_derivatives().0)
+    fn gradient<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (gradient, _) = self.inner.elastic_derivatives().map_err(|error| term_error(py, &error))?;
+        Ok(PyArray1::from_vec(py, gradient))
     }
 
     /// Elastic Hessian: values, row indices and column starts of compressed columns.
-    fn hessian<'py>(&mut self, py: Python<'py>) -> Hessian<'py> {
-        let (_, hessian) = self.inner.elastic_derivatives();
+    fn hessian<'py>(&mut self, py: Python<'py>) -> PyResult<Hessian<'py>> {
+        let (_, hessian) = self.inner.elastic_derivatives().map_err(|error| term_error(py, &error))?;
         let pattern = self.inner.model().pattern();
         let indices = |values: &[usize]| PyArray1::from_iter(py, values.iter().map(|&value| value as i64));
-        (PyArray1::from_vec(py, hessian), indices(pattern.row_indices()), indices(pattern.column_starts()))
+        Ok((PyArray1::from_vec(py, hessian), indices(pattern.row_indices()), indices(pattern.column_starts())))
     }
 
     /// Resistance of the nodes, (3N, 3N), N s/m.
@@ -323,7 +331,9 @@ fn frame_of<'py>(py: Python<'py>, inner: &mut core::Simulation) -> PyResult<Boun
     frame.set_item("minimum_gap", inner.smallest_gap().unwrap_or(f64::INFINITY))?;
     frame.set_item("contacts", inner.state().contacts.len())?;
     frame.set_item("account", PyArray1::from_slice(py, &inner.state().account.numbers()))?;
-    frame.set_item("energy", PyArray1::from_slice(py, &inner.energies()))?;
+    let energies = inner.energies();
+    let elastic = ELASTIC.map(|part| energies.iter().find(|(name, _)| *name == part).map_or(f64::NAN, |(_, e)| *e));
+    frame.set_item("energy", PyArray1::from_slice(py, &elastic))?;
     Ok(frame)
 }
 

@@ -8,8 +8,10 @@ use crate::simulation::Simulation;
 use crate::simulation::failure::StepError;
 use crate::state::State;
 use crate::step::equations::StepEquations;
-use crate::step::problem::{Step, Unknowns};
+use crate::step::given::{Drives, Step};
+use crate::step::problem::Problem;
 use crate::step::statistics::Statistics;
+use crate::step::unknowns::Unknowns;
 
 /// Most corrections of an interpolated state, and the parts of Newton's goal below which none is made any more and which the
 /// last one may have, its square being what it leaves.
@@ -34,7 +36,7 @@ impl Simulation {
         let mut state = self.interpolated(time)?;
         if !state.history.past.is_empty() {
             let shafts = self.model.shafts(&state.motor_angles, &state.q);
-            let configuration = &mut self.balance.configuration;
+            let configuration = &mut self.solver.at.configuration;
             if configuration.update(&self.model.network, &state.q, &state.frames, &shafts) {
                 configuration.accept(&mut state.frames);
                 self.settle(&mut state);
@@ -115,32 +117,30 @@ impl Simulation {
         let step = Step {
             scheme: self.scheme,
             state: &base,
-            motor_angles: base.motor_angles.clone(),
-            motor_torques,
+            end: state.time,
+            drives: Drives { motor_angles: base.motor_angles.clone(), motor_torques, inputs, ambient, outside: None },
             rate: 1.0 / (self.state.time - self.state.history.past[0].time),
             drift: base.velocity.clone(),
             velocity_drift: self.acceleration_at(state.time),
-            inputs,
-            ambient,
-            outside: None,
         };
         let mut found = Unknowns { q: base.q.clone(), density: base.density.clone(), tensions: base.tensions.clone() };
         if self.correct(&step, &mut found, goal).is_some() {
             let rates = state.velocity.iter_mut().zip(found.q.iter().zip(&base.q));
             rates.for_each(|(velocity, (new, old))| *velocity += step.rate * (new - old));
             (state.q, state.density, state.tensions) = (found.q, found.density, found.tensions);
-            self.balance.configuration.accept(&mut state.frames);
+            self.solver.at.configuration.accept(&mut state.frames);
         }
     }
 
     /// Newton's method on the balance of forces.
     fn correct(&mut self, step: &Step, found: &mut Unknowns, goal: f64) -> Option<()> {
-        let Self { model, balance, .. } = self;
-        let mut uncounted = Statistics::default();
         self.fluid_step = None;
-        balance.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
-        balance.begin(model, step, &mut uncounted).ok()?;
-        let mut equations = StepEquations { balance, model, step, statistics: &mut uncounted };
+        let Self { model, solver, .. } = self;
+        let mut uncounted = Statistics::default();
+        solver.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
+        solver.begin(model, step, &mut uncounted).ok()?;
+        let problem = Problem::new(model, step);
+        let mut equations = StepEquations { problem, solver, statistics: &mut uncounted };
         equations.aim(Goal::Correction(goal), found);
         let (mut direction, mut left) = (found.clone(), f64::INFINITY);
         for _ in 0..MOST_CORRECTIONS {
@@ -148,7 +148,7 @@ impl Simulation {
             equations.weigh();
             equations.linearize(found).ok()?;
             // What friction still has to slide does not count: a contact that sticks shows the stresses that it has.
-            left = equations.balance.correction(equations.model, step, goal, equations.statistics).ok()?.length;
+            left = equations.solver.correction(problem, goal, equations.statistics).ok()?.length;
             equations.direction(found, LINEAR, &mut direction).ok()?;
             let from = found.clone();
             equations.advance(&from, &direction, 1.0, found);
