@@ -35,7 +35,7 @@ type Prepared = (OverStep, Option<Arc<OutsideForce>>);
 
 impl Simulation {
     /// Tries one step of the given length and order; whether it was accepted.
-    pub(crate) fn try_step(&mut self, dt: f64, order: usize) -> Result<bool, TryError> {
+    pub(super) fn try_step(&mut self, dt: f64, order: usize) -> Result<bool, TryError> {
         // Forces of a step's beginning are right to first order, and only the first order's estimate sees what they leave out.
         let order = if self.force.is_some() { 1 } else { order.min(self.state.history.past.len() + 1) };
         let (t0, t1) = (self.state.time, self.state.time + dt);

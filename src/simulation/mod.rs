@@ -41,24 +41,24 @@ const HALVINGS: u32 = 12;
 
 /// A model, what drives it, its state, and the workspace that takes it forward.
 pub struct Simulation {
-    pub(crate) model: Arc<Model>,
-    pub(crate) inputs: Inputs,
-    pub(crate) state: State,
-    pub(crate) solver: Solver,
-    pub(crate) scheme: Scheme,
-    pub(crate) dt: f64,
-    pub(crate) settings: NewtonSettings,
-    pub(crate) work: NewtonWork<Unknowns>,
-    pub(crate) statistics: Statistics,
+    model: Arc<Model>,
+    inputs: Inputs,
+    state: State,
+    solver: Solver,
+    scheme: Scheme,
+    dt: f64,
+    settings: NewtonSettings,
+    work: NewtonWork<Unknowns>,
+    statistics: Statistics,
     fluid_step: Option<u64>,
     trial: Unknowns,
     extrapolated: Vec<f64>,
-    pub(crate) tolerance: Option<f64>,
-    pub(crate) force: Option<ForceFunction>,
+    tolerance: Option<f64>,
+    force: Option<ForceFunction>,
     /// What the function gave for the step with this number: a step that is tried again sees the same.
-    pub(crate) given: Option<(u64, Arc<OutsideForce>)>,
+    given: Option<(u64, Arc<OutsideForce>)>,
     positions: Vec<Vec3>,
-    pub(crate) progress: Progress,
+    progress: Progress,
 }
 
 impl Simulation {
@@ -162,7 +162,7 @@ impl Simulation {
     }
 
     /// The fluid no longer stands where the next step needs it.
-    pub(crate) fn forget_fluid(&mut self) {
+    fn forget_fluid(&mut self) {
         self.fluid_step = None;
     }
 
@@ -173,7 +173,7 @@ impl Simulation {
     }
 
     /// Goes back to a state from which steps were tried: the work that they took still counts.
-    pub(crate) fn go_back(&mut self, state: State) {
+    fn go_back(&mut self, state: State) {
         self.state = state;
         self.anchor_contact();
         self.fluid_step = None;
@@ -283,7 +283,7 @@ impl Simulation {
         result
     }
 
-    pub(crate) fn convergence_error(
+    fn convergence_error(
         &mut self,
         dt: f64,
         residual: f64,
