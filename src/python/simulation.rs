@@ -83,12 +83,8 @@ impl Simulation {
 
     /// The frame at a time within the last step, interpolated as far as contact allows.
     fn frame_at<'py>(&mut self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyDict>> {
-        let present = self.inner.state().clone();
         let then = self.inner.frame_state(time).map_err(|error| step_error(py, error))?;
-        self.inner.restore(then);
-        let frame = self.frame(py);
-        self.inner.restore(present);
-        frame
+        self.inner.look_at(then, |inner| frame_of(py, inner))
     }
 
     /// Advances by `duration` seconds in one step.
@@ -137,8 +133,7 @@ impl Simulation {
 
     #[getter]
     fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let state = self.inner.state();
-        PyArray1::from_iter(py, self.inner.model().network().edge_dofs().iter().map(|&dof| state.q[dof]))
+        angles_of(py, &self.inner)
     }
 
     /// Degrees of freedom and their rates, in the interleaved numbering.
@@ -203,7 +198,7 @@ impl Simulation {
     /// Energies of all terms that have one, J, by name.
     fn energies<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let energies = PyDict::new(py);
-        for (name, energy) in self.inner.energies() {
+        for (name, energy) in self.inner.balanced(core::Simulation::energies).map_err(|error| step_error(py, error))? {
             energies.set_item(name, energy)?;
         }
         Ok(energies)
@@ -231,26 +226,9 @@ impl Simulation {
         PyArray1::from_vec(py, flat).reshape_with_order([size, size], numpy::npyffi::NPY_ORDER::NPY_FORTRANORDER)
     }
 
-    /// Everything a saved frame holds but the time, as a mapping of arrays.
+    /// Everything a saved frame holds, as a mapping of arrays.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let frame = PyDict::new(py);
-        let speeds = self.inner.motor_speeds().map_err(|error| step_error(py, StepError::Signal(error)))?;
-        let density = self.inner.force_density().map_err(|error| linear_error(py, &error))?;
-        frame.set_item("time", self.inner.state().time)?;
-        frame.set_item("nodes", self.nodes(py)?)?;
-        frame.set_item("theta", self.theta(py))?;
-        frame.set_item("velocities", self.velocities(py)?)?;
-        frame.set_item("force_density", from_flat(py, density, 3)?)?;
-        frame.set_item("motor_angle", PyArray1::from_slice(py, &self.inner.state().motor_angles))?;
-        frame.set_item("motor_speed", PyArray1::from_vec(py, speeds))?;
-        frame.set_item("motor_torque", PyArray1::from_vec(py, self.inner.motor_torques()))?;
-        frame.set_item("minimum_gap", self.inner.smallest_gap().unwrap_or(f64::INFINITY))?;
-        frame.set_item("contacts", self.inner.state().contacts.len())?;
-        frame.set_item("account", self.account(py))?;
-        let energies = self.inner.energies();
-        let elastic = ELASTIC.map(|part| energies.iter().find(|(name, _)| *name == part).map_or(f64::NAN, |(_, e)| *e));
-        frame.set_item("energy", PyArray1::from_slice(py, &elastic))?;
-        Ok(frame)
+        self.inner.balanced(|inner| frame_of(py, inner)).map_err(|error| step_error(py, error))?
     }
 
     /// Energies, balances and extremes so far, as `flagrs.budget` reads them.
@@ -335,6 +313,34 @@ impl Simulation {
         };
         self.inner.adopt(state).map_err(|error| model_error(py, &error))
     }
+}
+
+/// Everything a saved frame holds of the present state.
+fn frame_of<'py>(py: Python<'py>, inner: &mut core::Simulation) -> PyResult<Bound<'py, PyDict>> {
+    let frame = PyDict::new(py);
+    let speeds = inner.motor_speeds().map_err(|error| step_error(py, StepError::Signal(error)))?;
+    let density = inner.force_density().map_err(|error| linear_error(py, &error))?;
+    frame.set_item("time", inner.state().time)?;
+    frame.set_item("nodes", from_points(py, &inner.positions())?)?;
+    frame.set_item("theta", angles_of(py, inner))?;
+    frame.set_item("velocities", from_points(py, &inner.velocities())?)?;
+    frame.set_item("force_density", from_flat(py, density, 3)?)?;
+    frame.set_item("motor_angle", PyArray1::from_slice(py, &inner.state().motor_angles))?;
+    frame.set_item("motor_speed", PyArray1::from_vec(py, speeds))?;
+    frame.set_item("motor_torque", PyArray1::from_vec(py, inner.motor_torques()))?;
+    frame.set_item("minimum_gap", inner.smallest_gap().unwrap_or(f64::INFINITY))?;
+    frame.set_item("contacts", inner.state().contacts.len())?;
+    frame.set_item("account", PyArray1::from_slice(py, &inner.state().account.numbers()))?;
+    let energies = inner.energies();
+    let elastic = ELASTIC.map(|part| energies.iter().find(|(name, _)| *name == part).map_or(f64::NAN, |(_, e)| *e));
+    frame.set_item("energy", PyArray1::from_slice(py, &elastic))?;
+    Ok(frame)
+}
+
+/// Angles of the edges, rad.
+fn angles_of<'py>(py: Python<'py>, inner: &core::Simulation) -> Bound<'py, PyArray1<f64>> {
+    let state = inner.state();
+    PyArray1::from_iter(py, inner.model().network().edge_dofs().iter().map(|&dof| state.q[dof]))
 }
 
 /// Lets `steps` run without the interpreter's lock, looking for Ctrl-C; what a signal handler raised comes out of it.

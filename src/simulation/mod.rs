@@ -174,12 +174,17 @@ impl Simulation {
 
     /// Goes back to a state from which steps were tried: the work that they took still counts.
     fn go_back(&mut self, state: State) {
-        if let Some(contact) = &mut self.solver.medium.contact {
-            contact.restore(&state);
-        }
         self.state = state;
+        self.anchor_contact();
         self.fluid_step = None;
         self.given = None;
+    }
+
+    /// Lets contact list its near pairs where the state has them listed.
+    pub(crate) fn anchor_contact(&mut self) {
+        if let Some(contact) = &mut self.solver.medium.contact {
+            contact.restore(&self.state);
+        }
     }
 
     /// As [`Self::restore`], for a state from elsewhere.
@@ -300,7 +305,13 @@ impl Simulation {
             iterations,
             smallest_gap,
             worst_node: worst.map(|worst| dofs.partition_point(|&dof| dof <= worst).saturating_sub(1)),
-            reason: format!("{reason}; {advice}"),
+            reason: match self.coincidence().filter(|_| reason.contains("singular")) {
+                Some([node, edge]) => format!(
+                    "{reason}; node {node} stands on edge {edge}, where the fluid cannot tell their forces apart: move it away by a \
+                     millionth of its filament's size or more, or join the two in one rod"
+                ),
+                None => format!("{reason}; {advice}"),
+            },
         }
     }
 

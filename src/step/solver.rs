@@ -178,11 +178,6 @@ impl Solver {
         self.targets.size(model, &self.at.residual, &self.at.slip, self.medium.flow.dofs())
     }
 
-    /// Takes the fluid's equation for solved.
-    pub fn forget_slip(&mut self) {
-        self.at.slip.fill(0.0);
-    }
-
     /// Residual at a trial; `None` if there is none, for the reason that [`Self::unbalanced`] tells.
     pub fn evaluate(&mut self, problem: Problem, trial: &Unknowns, statistics: &mut Statistics) -> Option<Size> {
         let start = Instant::now();
