@@ -30,6 +30,7 @@ from flagrs.scene import (
     Scene,
     Table,
     TimeFunction,
+    Wall,
 )
 from flagrs.simulation import Simulation
 from flagrs.suggest import Suggestion, suggest
@@ -72,6 +73,7 @@ __all__ = [
     "Table",
     "TimeFunction",
     "Trajectory",
+    "Wall",
     "__version__",
     "contact",
     "fluid",

@@ -10,6 +10,7 @@ from flagrs.errors import FlagrsError
 from flagrs.fluid import velocity
 from flagrs.scene import Scene
 from flagrs.scene.values import FloatArray, IntArray
+from flagrs.scene.wall_checks import wall_in_flow
 
 
 def immersed_edges(scene: Scene) -> tuple[IntArray, FloatArray]:
@@ -32,4 +33,5 @@ def flow_of(
         raise FlagrsError("a flow needs a fluid of regularized Stokeslet segments, Fluid(model='RSS')")
     # A dry edge beside an immersed one would carry half a hat of their common node's density.
     edges, widths = immersed_edges(scene)
-    return velocity(points, nodes, edges, density, fluid.viscosity, widths, threads)
+    wall = wall_in_flow(scene)
+    return velocity(points, nodes, edges, density, fluid.viscosity, widths, threads, wall)

@@ -59,7 +59,11 @@ pub(crate) fn dissipative_terms(
     }
     if let Some(head) = &specification.head {
         let drag = [head.translation, head.rotation];
-        terms.push(Box::new(Head::new(network, head.node, head.edges.clone(), lengths, drag)));
+        let term = Head::new(network, head.node, head.edges.clone(), lengths, drag);
+        terms.push(Box::new(match specification.head_near_wall() {
+            Some(plane) => term.near(plane),
+            None => term,
+        }));
     }
     let forces = weights(specification, network, dof_count, lengths);
     if forces.iter().any(|&force| force != 0.0) {

@@ -5,7 +5,7 @@
 //! * [`force`]: a function that is asked for forces.
 //! * [`loads`]: loads, magnetism and background flows from mappings.
 //! * [`far_field`]: the product with the mobility without its matrix.
-//! * [`numerics`]: mobility, velocity and distances on plain arrays.
+//! * [`numerics`]: mobility, velocity and distances on plain arrays; [`walls`]: walls from mappings.
 //! * [`errors`]: errors of the core as Python exceptions.
 //! * [`arrays`]: positions and indices in and out of NumPy.
 
@@ -17,6 +17,7 @@ mod loads;
 mod numerics;
 mod simulation;
 mod specification;
+mod walls;
 
 use pyo3::prelude::*;
 
@@ -28,6 +29,7 @@ fn _flagrs(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<far_field::FastMobility>()?;
     module.add_function(wrap_pyfunction!(numerics::mobility, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::velocity, module)?)?;
+    module.add_function(wrap_pyfunction!(numerics::image_velocity, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::hat_weights, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::segment_distance, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::thread_count, module)?)?;

@@ -271,6 +271,9 @@ impl Balance {
             self.outer.iter_mut().zip(&self.share).for_each(|(outer, force)| *outer += force);
             power[LOADS] -= dot(&self.share, velocity);
         }
+        if let (Some(law), Some(barrier)) = (model.barrier(), &mut self.barrier) {
+            barrier.add_wall_forces(law, model.network.node_dofs(), accepted.q, &increment, &mut self.outer);
+        }
         if step.scheme.has_inertia() {
             let mut out = Assembly { residual: &mut self.outer, jacobian: None };
             model.inertia.add(&self.configuration, &increment, &mut out);

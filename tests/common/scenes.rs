@@ -118,6 +118,7 @@ fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
         clamps: vec![],
         loads: vec![],
         magnetism: None,
+        walls: vec![],
         flows: vec![],
         gravity: Vec3::zeros(),
         reynolds: vec![],

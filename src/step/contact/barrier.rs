@@ -29,15 +29,18 @@ fn place(q: &[f64], node_dofs: &[usize], out: &mut Vec<Vec3>) {
 
 impl BarrierTerm {
     pub fn new(law: &BarrierLaw) -> Self {
+        let state = law.state();
+        let bound = state.stencils().next().is_none();
         Self {
-            state: law.state(),
+            // Nothing to bind, unless there are walls.
+            bound,
+            state,
             nodes: Vec::new(),
             velocities: Vec::new(),
             change: Vec::new(),
             path: [Vec::new(), Vec::new()],
             stencils: Vec::new(),
             slots: Vec::new(),
-            bound: true,
             curvature: Curvature::Exact,
         }
     }
@@ -97,6 +100,9 @@ impl BarrierTerm {
     ) {
         self.place(law, node_dofs, q);
         law.find_sliding(&mut self.state, &self.nodes);
+        if law.has_friction() {
+            self.follow(node_dofs, q, increment);
+        }
         let state = &self.state;
         let spread = |element: usize, gradient: &[f64], out: &mut [f64]| {
             for (&node, part) in state.stencil(element).iter().zip(gradient.chunks_exact(3)) {
@@ -105,12 +111,41 @@ impl BarrierTerm {
         };
         law.add(&self.state, &self.nodes, None, |element, gradient, _| spread(element, gradient, elastic));
         if law.has_friction() {
-            self.velocities.clear();
-            let rate = |dof: usize| increment.rate_of(dof, q[dof]);
-            self.velocities.extend(node_dofs.iter().map(|&dof| Vec3::from_fn(|c, _| rate(dof + c))));
             let add = |element: usize, gradient: &[f64], _: Option<&[f64]>| spread(element, gradient, residual);
             law.add_friction(&self.state, &self.nodes, &self.velocities, None, add);
         }
+    }
+
+    /// Adds minus the forces of walls, friction included, to `out`.
+    pub fn add_wall_forces(
+        &mut self,
+        law: &BarrierLaw,
+        node_dofs: &[usize],
+        q: &[f64],
+        increment: &Increment,
+        out: &mut [f64],
+    ) {
+        let walls = law.bodies().at_walls().count();
+        if walls == 0 {
+            return;
+        }
+        self.place(law, node_dofs, q);
+        law.find_sliding(&mut self.state, &self.nodes);
+        self.follow(node_dofs, q, increment);
+        let mut spread = |element: usize, gradient: &[f64], _: Option<&[f64]>| {
+            for (&node, part) in self.state.stencil(element).iter().zip(gradient.chunks_exact(3)) {
+                (0..3).filter(|_| element < walls).for_each(|c| out[node_dofs[node] + c] += part[c]);
+            }
+        };
+        law.add(&self.state, &self.nodes, None, &mut spread);
+        law.add_friction(&self.state, &self.nodes, &self.velocities, None, &mut spread);
+    }
+
+    /// Takes the velocities of a trial.
+    fn follow(&mut self, node_dofs: &[usize], q: &[f64], increment: &Increment) {
+        self.velocities.clear();
+        let rate = |dof: usize| increment.rate_of(dof, q[dof]);
+        self.velocities.extend(node_dofs.iter().map(|&dof| Vec3::from_fn(|c, _| rate(dof + c))));
     }
 
     /// Energy at these degrees of freedom, J.
