@@ -3,9 +3,9 @@
 mod common;
 
 use common::Random;
+use flagrs::forces::channels::{Channels, VectorChannels};
 use flagrs::forces::edge_vector::{EdgeVector, edge_dofs};
 use flagrs::forces::follower::{FollowerForce, FollowerTorque};
-use flagrs::forces::inputs::{Inputs, VectorChannels};
 use flagrs::forces::laboratory::{EdgeTorque, NodeForce};
 use flagrs::forces::magnetic::Magnetism;
 use flagrs::linear::pattern::Pattern;
@@ -13,7 +13,6 @@ use flagrs::rod::assembly::{Assembly, Increment, Term};
 use flagrs::rod::configuration::Configuration;
 use flagrs::rod::network::Network;
 use flagrs::rod::reference::ReferenceFrames;
-use flagrs::signal::Signal;
 use flagrs::{Mat3, Vec3};
 
 /// Two edges, frames of a reference shape, and degrees of freedom away from it.
@@ -39,10 +38,8 @@ impl Case {
         Self { network, frames, q, inputs: FORCE.to_vec() }
     }
 
-    fn channels() -> (Inputs, VectorChannels) {
-        let mut inputs = Inputs::default();
-        let channels = inputs.add_vector(FORCE.map(Signal::Constant));
-        (inputs, channels)
+    fn channels() -> VectorChannels {
+        Channels::default().take_vector()
     }
 
     fn configuration(&self, q: &[f64]) -> Configuration {
@@ -97,7 +94,7 @@ fn check_derivative(case: &Case, term: &mut dyn Term) {
 }
 
 fn terms(network: &Network) -> Vec<Box<dyn Term>> {
-    let (_, channels) = Case::channels();
+    let channels = Case::channels();
     let gradient = Mat3::new(0.3, 0.2, -0.5, 0.2, 0.4, 0.1, -0.5, 0.1, -0.7);
     let moments = vec![(0, Vec3::new(0.5, -0.3, 0.8)), (1, Vec3::new(-0.2, 0.6, 0.4))];
     vec![
@@ -126,7 +123,7 @@ fn derivatives_of_loads_agree_with_differences() {
 fn magnetic_residual_is_the_gradient_of_the_energy() {
     let mut random = Random::new(12);
     let case = Case::new(&mut random, 0.3);
-    let (_, channels) = Case::channels();
+    let channels = Case::channels();
     let gradient = Mat3::new(0.3, 0.2, -0.5, 0.2, 0.4, 0.1, -0.5, 0.1, -0.7);
     let magnetism = Magnetism::new(&case.network, vec![(1, Vec3::new(0.5, -0.3, 0.8))], channels, gradient);
     let residual = case.evaluate(&magnetism, &case.q, None);
@@ -153,7 +150,7 @@ fn torques_on_edges_add_up_to_what_was_asked_for() {
     let mut random = Random::new(13);
     // At the reference frames, where no holonomy blurs the angle's own torque.
     let case = Case::new(&mut random, 0.0);
-    let (_, channels) = Case::channels();
+    let channels = Case::channels();
     let torque = EdgeTorque::new(&case.network, vec![(1, 2.0)], channels);
     let found = total_torque(&case, &case.evaluate(&torque, &case.q, None));
     assert!((found - Vec3::from(FORCE) * 2.0).norm() < 1e-13, "{found}");
@@ -168,7 +165,7 @@ fn torques_on_edges_add_up_to_what_was_asked_for() {
 fn magnetic_torque_is_moment_cross_field() {
     let mut random = Random::new(14);
     let case = Case::new(&mut random, 0.0);
-    let (_, channels) = Case::channels();
+    let channels = Case::channels();
     let components = Vec3::new(0.5, -0.3, 0.8);
     let magnetism = Magnetism::new(&case.network, vec![(0, components)], channels, Mat3::zeros());
     let moment = EdgeVector::new(&case.configuration(&case.q), 0, components).value;

@@ -30,7 +30,8 @@ impl Step {
     fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
         let shape: Vec<Vec3> = (0..NODES).map(|k| Vec3::new(k as f64, 0.0, 0.0) + random.vector(0.3)).collect();
-        let (model, start) = Model::new(scene(shape, chain_edges(NODES), chain_hinges(NODES))).expect("a chain");
+        let model = Model::new(scene(shape, chain_edges(NODES), chain_hinges(NODES))).expect("a chain");
+        let start = State::initial(&model).expect("a shape");
         let before = start.q.clone();
         let mut noise = |size: f64| (0..before.len()).map(|_| size * random.uniform()).collect::<Vec<f64>>();
         let (moves, drift, velocity) = (noise(0.2), noise(0.1), noise(0.4));

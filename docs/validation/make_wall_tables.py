@@ -1,7 +1,7 @@
-"""Makes the tables of walls.md: images, rods, helices and the robot near walls.
+"""Makes tables of walls.md: rods and helices near walls, a rod that slides on one.
 
-Run with ``python docs/validation/make_wall_tables.py`` (about a quarter of an hour on one core); it prints
-the tables. ``--quick`` leaves out those that simulate.
+Run with ``python docs/validation/make_wall_tables.py`` (about a minute); it prints them. ``--quick``
+leaves out the one that simulates.
 """
 
 from __future__ import annotations
@@ -114,32 +114,9 @@ def slope() -> None:
         print(f"| {share:g} | {1e3 * moved / 1.0:.5f} | {least:.4f} |")
 
 
-def robot() -> None:
-    """Speed and drift of the robot against the distance of a wall."""
-    for C_t, C_r, distances in ((4.1, 0.9, (0.3, 0.4, 0.6, 1.0)), (1.2, 1.5, (0.09, 0.12, 0.2, 0.4))):
-        print(f"\nC_t = {C_t}, C_r = {C_r}\n")
-        print("| distance, m | speed, mm/s | over that without | towards the wall, mm/s |", end="")
-        print(" sideways, mm/s | head rate, rad/s |")
-        print("|---|---|---|---|---|---|")
-        free = 0.0
-        for distance in (None, *distances):
-            scene = flagrs.scenarios.robot(C_t=C_t, C_r=C_r, wall=distance)
-            trajectory = Simulation(scene, rtol=1e-3).run(until=15.0, save_every=0.05)
-            speed = trajectory.swimming_speed(5.0, 15.0)
-            free = free or speed
-            centre = trajectory.nodes.mean(axis=1)
-            drift = (centre[-1] - centre[100]) / (trajectory.time[-1] - trajectory.time[100])
-            print(
-                f"| {distance or 'none'} | {1e3 * speed:.4f} | {speed / free:.4f} | {-1e3 * drift[2]:.5f} | "
-                f"{1e3 * drift[1]:.5f} | {trajectory.head_rate(5.0, 15.0):.5f} |",
-                flush=True,
-            )
-
-
 if __name__ == "__main__":
     cylinder()
     short_rod()
     helices()
     if "--quick" not in sys.argv:
         slope()
-        robot()

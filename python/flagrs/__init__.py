@@ -9,12 +9,16 @@ from flagrs.guards import (
     MeshWarning,
     ReynoldsWarning,
     StabilityWarning,
+    StationarityWarning,
     StepWarning,
     StrainWarning,
 )
 from flagrs.scene import (
+    Capsule,
     Clamp,
     Contact,
+    Cylinder,
+    Ellipsoid,
     FlowFunction,
     Fluid,
     Head,
@@ -28,6 +32,7 @@ from flagrs.scene import (
     Rod,
     Rotation,
     Scene,
+    Sphere,
     Table,
     TimeFunction,
     Wall,
@@ -41,10 +46,13 @@ from flagrs.version import installed_version
 __version__ = installed_version()
 
 __all__ = [
+    "Capsule",
     "Clamp",
     "Contact",
     "ContactWarning",
     "ConvergenceError",
+    "Cylinder",
+    "Ellipsoid",
     "EnergyWarning",
     "FileError",
     "FlagrsError",
@@ -66,7 +74,9 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
+    "Sphere",
     "StabilityWarning",
+    "StationarityWarning",
     "StepWarning",
     "StrainWarning",
     "Suggestion",

@@ -1,4 +1,4 @@
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -8,6 +8,7 @@ _Floats = npt.NDArray[np.float64]
 _Ints = npt.NDArray[np.int64]
 
 __all__ = [
+    "BodySurface",
     "FastMobility",
     "Simulation",
     "__version__",
@@ -20,6 +21,23 @@ __all__ = [
 ]
 
 __version__: str
+
+@final
+class BodySurface:
+    @staticmethod
+    def ellipsoid(semi_axes: Sequence[float], accuracy: float) -> BodySurface: ...
+    @staticmethod
+    def cylinder(radius: float, length: float, edge_radius: float, accuracy: float) -> BodySurface: ...
+    @property
+    def sources(self) -> _Floats: ...
+    @property
+    def points(self) -> _Floats: ...
+    @property
+    def error(self) -> float: ...
+    @property
+    def slip(self) -> float: ...
+    def resistance(self, viscosity: float) -> _Floats: ...
+    def forces(self, motion: Sequence[float], viscosity: float) -> _Floats: ...
 
 @final
 class FastMobility:
@@ -92,10 +110,8 @@ def mobility(
 ) -> _Floats: ...
 def image_velocity(
     at: _Floats,
-    nodes: _Floats,
-    edges: _Ints,
+    segments: tuple[_Floats, _Ints, _Floats],
     density: _Floats,
-    epsilon: _Floats,
     wall: Mapping[str, Any],
     threads: int,
 ) -> _Floats: ...
@@ -103,8 +119,7 @@ def velocity(
     at: _Floats,
     nodes: _Floats,
     edges: _Ints,
-    force_density: _Floats,
-    viscosity: float,
+    density: _Floats,
     epsilon: _Floats,
     threads: int,
 ) -> _Floats: ...

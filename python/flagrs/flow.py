@@ -9,7 +9,7 @@ import numpy as np
 from flagrs.errors import FlagrsError
 from flagrs.fluid import velocity
 from flagrs.scene import Scene
-from flagrs.scene.values import FloatArray, IntArray
+from flagrs.scene.values import BoolArray, FloatArray, IntArray
 from flagrs.scene.wall_checks import wall_in_flow
 
 
@@ -22,6 +22,14 @@ def immersed_edges(scene: Scene) -> tuple[IntArray, FloatArray]:
     edges = [offset + rod.edge_array()[wet] for offset, rod, wet in parts]
     widths = [fluid.epsilon_array(rod.radius_array())[wet] for _, rod, wet in parts]
     return np.concatenate(edges), np.concatenate(widths)
+
+
+def in_fluid(scene: Scene, points: FloatArray) -> BoolArray:
+    """Return which of the points (M, 3) [m] are on the fluid's side of a wall in the flow."""
+    wall = wall_in_flow(scene)
+    heights = np.zeros(len(points)) if wall is None else wall.heights(points)
+    inside: BoolArray = heights >= 0.0
+    return inside
 
 
 def flow_of(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from flagrs import _flagrs
+from flagrs.body_surface import BodySurface
 from flagrs.errors import SceneError
 from flagrs.force_density import check_edges
 from flagrs.memory import require_memory
@@ -15,7 +17,7 @@ from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
 from flagrs.scene.wall import Wall
 from flagrs.threads import thread_count
 
-__all__ = ["FastMobility", "hat_weights", "mobility", "velocity"]
+__all__ = ["BodySurface", "FastMobility", "hat_weights", "mobility", "velocity"]
 
 
 def mobility(
@@ -132,12 +134,13 @@ def velocity(
     check_edges(force_density, pairs)
     mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
+    scaled = density * (1.0 / (8.0 * math.pi * mu))
     side = _side(wall, {"nodes": sources, "points": at})
-    flow = _flagrs.velocity(at, sources, pairs, density, mu, widths, thread_count(threads))
+    flow = _flagrs.velocity(at, sources, pairs, scaled, widths, thread_count(threads))
     if side is None:
         return flow
-    scaled = density / (8.0 * np.pi * mu)
-    return flow + _flagrs.image_velocity(at, sources, pairs, scaled, widths, side, thread_count(threads))
+    segments = (sources, pairs, widths)
+    return flow + _flagrs.image_velocity(at, segments, scaled, side, thread_count(threads))
 
 
 class FastMobility:

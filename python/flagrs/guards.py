@@ -47,6 +47,10 @@ class ReynoldsWarning(FlagrsWarning):
     """Motion too fast for a fluid without inertia."""
 
 
+class StationarityWarning(FlagrsWarning):
+    """A mean over time of what has not become steady."""
+
+
 #: Share of the energy that has passed which steps may lose, or make.
 MOST_LOST, MOST_MADE = 0.2, 0.05
 #: Bending beyond the natural shape [rad] from which a hinge overstates the energy of the arc it stands for by

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,9 +19,12 @@ from flagrs.flow import flow_of, immersed_edges
 from flagrs.fluid import hat_weights
 from flagrs.force_density import ForceDensity
 from flagrs.frame import shapes_of
-from flagrs.guards import Notice, notices
+from flagrs.guards import Notice, StationarityWarning, notices
 from flagrs.measures import along, angle_about, slope, spin_about, window
-from flagrs.results.material_frames import directors
+from flagrs.results.bundle import Bundle, bundle_of
+from flagrs.results.material_frames import directors, each_director
+from flagrs.results.readouts import ReadOuts, readouts_of
+from flagrs.results.swimming import Swimming, swimming_of
 from flagrs.scene import Head, Motor, Scene, Table, codec
 from flagrs.scene.rod_topology import edges_at_nodes, far_end
 from flagrs.scene.scene_checks import edges_of_head
@@ -28,6 +32,9 @@ from flagrs.scene.values import FloatArray, IntArray
 from flagrs.trajectory_file import Contents
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
+
     from flagrs.view import View
 
 
@@ -347,6 +354,92 @@ class Trajectory:
         """
         chosen = np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64)
         return directors(self.scene, self.time, self.nodes, self.theta, chosen, self._contents.state)
+
+    def each_director(self) -> Iterator[FloatArray]:
+        """Yield the material director m1 (E, 3) of the edges, frame by frame, as `material_directors`."""
+        return each_director(self.scene, self.time, self.nodes, self.theta, self._contents.state)
+
+    def swimming(self, start: float | None = None, end: float | None = None) -> Swimming:
+        """Return the swimming velocity with its uncertainty, in the laboratory and along the swimmer's axis.
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run. A `flagrs.StationarityWarning` says if the
+            velocity has a trend over it.
+
+        Raises
+        ------
+        FlagrsError
+            If fewer than nine frames lie in the window, or clamps hold filaments and there is no head.
+        """
+        found = swimming_of(self, start, end)
+        if not found.stationary:
+            warnings.warn(
+                f"the swimming velocity is not steady from {found.start:g} s to {found.end:g} s; "
+                "take a later window (start=), or run on",
+                StationarityWarning,
+                stacklevel=2,
+            )
+        return found
+
+    def readouts(self, start: float | None = None, end: float | None = None) -> ReadOuts:
+        """Return everything that is read off the run in single numbers, with units and errors; print it.
+
+        What means nothing for the scene is there without a value, and says why.
+
+        Parameters
+        ----------
+        start, end
+            Window [s]; by default the last half of the run.
+
+        Raises
+        ------
+        FlagrsError
+            If fewer than two frames lie in the window.
+        """
+        return readouts_of(self, start, end)
+
+    def bundle(self, frames: Any = None) -> Bundle:
+        """Return the filaments, measured together: gaps, phases, tips, twist, writhe, linking.
+
+        Parameters
+        ----------
+        frames
+            Indices (F,) of the frames, in increasing order; None: all.
+
+        Raises
+        ------
+        FlagrsError
+            If the scene has no immersed filament.
+        """
+        return bundle_of(self, np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64))
+
+    @property
+    def manifest(self) -> dict[str, str]:
+        """Where the run comes from: version of flagrs, time of creation, scene and settings as JSON."""
+        return dict(self._contents.manifest)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the run as an xarray Dataset with units; see `flagrs.export.arrays.to_xarray`."""
+        from flagrs.export.arrays import to_xarray  # exports read trajectories, so they are above this module
+
+        return to_xarray(self)
+
+    def to_pandas(self, of: str = "frames") -> pandas.DataFrame:
+        """Return the run as a table, a row for each of its ``frames`` or of the ``nodes`` in them.
+
+        Units are in the names of the columns; see `flagrs.export.arrays.to_pandas`.
+        """
+        from flagrs.export.arrays import to_pandas  # exports read trajectories, so they are above this module
+
+        return to_pandas(self, of)
+
+    def export(self, to: str, path: str | Path) -> list[Path]:
+        """Write the run as ``vtkhdf``, ``xarray``, ``npz`` or ``csv``; see `flagrs.export.export`."""
+        from flagrs.export import export  # exports read trajectories, so they are above this module
+
+        return export(self, to, path)
 
     def view(self, **options: Any) -> View:
         """Return the run in three dimensions, for a notebook or a page to `save`; see `flagrs.view.view`."""

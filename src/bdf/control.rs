@@ -16,6 +16,9 @@ const FAILED_CEILING: f64 = 0.8;
 /// How fast that ceiling rises, by accepted step.
 const CEILING_RISE: f64 = 1.05;
 
+/// The ceiling that is none, s: a number, as states are saved to files of numbers.
+pub const NO_CEILING: f64 = f64::MAX;
+
 /// Size and order of the next step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Control {
@@ -23,7 +26,8 @@ pub struct Control {
     pub dt: f64,
     /// Order of its backward difference.
     pub order: usize,
-    /// No step is longer, s: it comes down below a step whose equations could not be solved, and rises from there.
+    /// No step is longer, s: it comes down below a step whose equations could not be solved, and rises from there;
+    /// [`NO_CEILING`] where there is none.
     pub ceiling: f64,
     /// Whether the state stands at a jump that was found in what drives the scene.
     pub at_jump: bool,
@@ -31,7 +35,7 @@ pub struct Control {
 
 impl Default for Control {
     fn default() -> Self {
-        Self { dt: 0.0, order: 1, ceiling: f64::INFINITY, at_jump: false }
+        Self { dt: 0.0, order: 1, ceiling: NO_CEILING, at_jump: false }
     }
 }
 
@@ -81,7 +85,7 @@ impl Control {
             let order = self.order.min(2);
             return (Self { dt: dt * own.clamp(SMALLEST_FACTOR, 0.9), order, ..*self }, false);
         }
-        let ceiling = self.ceiling * CEILING_RISE;
+        let ceiling = (self.ceiling * CEILING_RISE).min(NO_CEILING);
         let Some(extrapolated) = extrapolated else {
             // The first of two steps whose error is told by the second.
             return (Self { dt: dt.min(ceiling), order: self.order, ceiling, at_jump: false }, true);
@@ -103,7 +107,7 @@ impl Control {
     /// What follows a step of length `dt` whose equations could not be solved: the longest such step is remembered.
     pub fn failed(&self, dt: f64) -> Self {
         let ceiling =
-            if dt < 0.9 * self.ceiling && self.ceiling.is_finite() { self.ceiling } else { FAILED_CEILING * dt };
+            if dt < 0.9 * self.ceiling && self.ceiling < NO_CEILING { self.ceiling } else { FAILED_CEILING * dt };
         Self { dt: FAILED_FACTOR * dt, order: self.order.min(2), ceiling, at_jump: false }
     }
 }
@@ -210,5 +214,15 @@ mod tests {
             accepted += 1;
         }
         assert!((3..20).contains(&accepted), "{accepted}");
+    }
+
+    #[test]
+    fn steps_that_nothing_bounds_stay_numbers() {
+        let mut control = Control { dt: 1.0, ..Control::default() };
+        for _ in 0..3000 {
+            let (past, to) = ([0.0, -control.dt], control.dt);
+            control = control.judge(&past, to, &estimate(&[0.0, 0.0], 1.0)).0;
+            assert!(control.dt.is_finite() && control.ceiling.is_finite());
+        }
     }
 }

@@ -1,7 +1,6 @@
 //! The head: drag on its node, and a couple against its turning about any axis on the edges fixed to it, both relative to a
 //! background flow (docs/theory/fluid.md, 9).
 
-use super::small_body::NearPlane;
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{Assembly, Element, Increment, Term};
 use crate::rod::configuration::{Configuration, node};
@@ -20,8 +19,6 @@ const WIDTH: usize = MOST_EDGES * EDGE_WIDTH;
 pub struct Head {
     translation: f64,
     rotation: f64,
-    /// What changes the drag near a wall.
-    near: Option<NearPlane>,
     node: usize,
     drag: Element,
     edges: Vec<usize>,
@@ -117,7 +114,6 @@ impl Head {
         Self {
             translation,
             rotation,
-            near: None,
             node: head,
             drag: Element::new(node_dofs(head).collect()),
             edges,
@@ -126,25 +122,13 @@ impl Head {
         }
     }
 
-    /// The same head near a plane, which changes its drag to first order; its couple, of third order, stays.
-    pub fn near(self, plane: NearPlane) -> Self {
-        Self { near: Some(plane), ..self }
-    }
-
     fn add_drag(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
         let dof = self.drag.dofs[0];
         let position = node(configuration.q(), dof);
         let flow = increment.background.map_or_else(Vec3::zeros, |background| background.node_velocities[self.node]);
         let velocity = Vec3::from_fn(|c, _| increment.rate_of(dof + c, position[c])) - flow;
-        let (resistance, turned) = match &self.near {
-            None => (Mat3::identity() * self.translation, Mat3::zeros()),
-            Some(near) => {
-                let (resistance, slope) = near.resistance(self.translation, &position);
-                (resistance, slope * velocity * near.boundary.plane().normal().transpose())
-            }
-        };
-        let force = resistance * velocity;
-        let matrix = resistance * increment.rate + turned;
+        let force = velocity * self.translation;
+        let matrix = Mat3::identity() * (self.translation * increment.rate);
         self.drag.add(force.as_slice(), Some(matrix.as_slice()), out);
     }
 

@@ -10,7 +10,7 @@
 //! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
 //! * [`ambient`]: prescribed background flows.
 //! * [`twist_drag`]: resistance of an edge to spinning about its own centreline.
-//! * [`head`]: drag of a head, and its couple about all axes; [`small_body`]: its drag near a wall.
+//! * [`head`]: drag of a head, and and its couple about all axes.
 
 pub mod ambient;
 pub mod far_field;
@@ -21,7 +21,6 @@ pub mod product;
 pub mod rft;
 pub mod rss;
 pub mod segment;
-pub mod small_body;
 pub mod stokeslet;
 pub mod twist_drag;
 

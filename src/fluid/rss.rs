@@ -28,8 +28,6 @@ pub struct StokesletSegments {
     scratch: Vec<f64>,
     local: ResistiveForce,
     boundary: Option<Boundary>,
-    /// Node of the head and the height it keeps, m.
-    head: Option<(usize, f64)>,
 }
 
 impl StokesletSegments {
@@ -61,30 +59,21 @@ impl StokesletSegments {
             viscosity,
             positions,
             boundary: None,
-            head: None,
         })
     }
 
     /// The same model in a fluid that ends at a boundary. Its products take a matrix, whatever the size of the scene; the local drag,
-    /// which preconditions, stays that of unbounded fluid. `head` is the node of a head and the height (m) from which on its drag is known.
-    pub fn with_boundary(self, boundary: Boundary, head: Option<(usize, f64)>) -> Self {
+    /// which preconditions, stays that of unbounded fluid.
+    pub fn with_boundary(self, boundary: Boundary) -> Self {
         let product = Product::new(self.nodes.len(), &FarFieldChoice::NEVER);
-        Self { product, boundary: Some(boundary), head, ..self }
+        Self { product, boundary: Some(boundary), ..self }
     }
 
     /// Checks that all of the filament is where the fluid is.
-    fn check_side(&self, nodes: &[Vec3]) -> Result<(), LinearError> {
+    fn check_side(&self) -> Result<(), LinearError> {
         let Some(boundary) = &self.boundary else { return Ok(()) };
-        if let Some((head, least)) = self.head {
-            let height = boundary.plane().height(&nodes[head]);
-            if !(height > least) {
-                return Err(LinearError::Product(format!(
-                    "the head at node {head} is {height:.3e} m from the wall; nearer than {least:.3e} m its drag is not known"
-                )));
-            }
-        }
         let heights = self.positions.iter().map(|position| boundary.plane().height(position));
-        match self.nodes.iter().zip(heights).find(|(_, height)| !(*height > 0.0)) {
+        match self.nodes.iter().zip(heights).find(|(_, height)| height.is_nan() || *height <= 0.0) {
             Some((node, height)) => Err(LinearError::Product(format!(
                 "node {node} is {:.3e} m behind the wall, where there is no fluid; with a Contact, rods stay on their side",
                 -height
@@ -107,7 +96,7 @@ impl FluidModel for StokesletSegments {
         for (position, &node) in self.positions.iter_mut().zip(&self.nodes) {
             *position = nodes[node];
         }
-        self.check_side(nodes)?;
+        self.check_side()?;
         let segments = Segments { nodes: &self.positions, edges: &self.edges, epsilon: &self.epsilon };
         self.product.update(segments, self.boundary.as_ref(), pool)?;
         self.weights.update(&self.positions);

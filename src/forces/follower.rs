@@ -1,7 +1,7 @@
 //! Forces and torques whose directions are fixed in the material frame of an edge and turn with it.
 
+use super::channels::{VectorChannels, vector};
 use super::edge_vector::{ANGLE, EdgeVector, Hessian7, LAST, edge_dofs, spin_derivative, spread};
-use super::inputs::{VectorChannels, vector};
 use crate::Vec3;
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{Assembly, Element, Increment, Term};

@@ -3,8 +3,8 @@
 //! A torque `T` on an edge does work on its rotation `t x de/l + (d theta + d beta) t`: its generalised force is `T x t / l` on the
 //! edge vector and `T . t` on the angle, and on the edge vector again through the holonomy `beta`.
 
+use super::channels::{VectorChannels, vector};
 use super::edge_vector::{ANGLE, Gradient7, Hessian7, LAST, edge_dofs, spin_derivative, spread};
-use super::inputs::{VectorChannels, vector};
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{Assembly, Element, Increment, Term};
 use crate::rod::configuration::Configuration;

@@ -3,8 +3,8 @@
 //! The moment `m` of an edge is fixed in its material frame; the field is `B(x, t) = B0(t) + G x`. The torque is `m x B`, the
 //! force `G^T m`.
 
+use super::channels::{VectorChannels, vector};
 use super::edge_vector::{ANGLE, EdgeVector, Gradient7, Hessian7, LAST, edge_dofs};
-use super::inputs::{VectorChannels, vector};
 use crate::linear::pattern::Pattern;
 use crate::rod::assembly::{Assembly, Element, Increment, Term};
 use crate::rod::configuration::{Configuration, node};

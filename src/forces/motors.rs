@@ -6,17 +6,14 @@
 
 use crate::rod::configuration::ShaftAngle;
 use crate::rod::strain::{THETA_E, THETA_F};
-use crate::signal::Signal;
 
 /// What drives a motor.
 #[derive(Debug, Clone)]
 pub enum Drive {
     /// Relative angular velocity of shaft and housing, rad/s.
-    Speed(Signal),
+    Speed,
     /// Torque of the motor on the shaft, N m; the angle follows from equilibrium and is a degree of freedom.
     Torque {
-        /// The torque.
-        signal: Signal,
         /// Degree of freedom of the angle.
         dof: usize,
     },
@@ -42,8 +39,8 @@ impl Motor {
     /// The shaft's angle: prescribed, or read from the degrees of freedom.
     pub fn shaft(&self, prescribed: f64, q: &[f64]) -> ShaftAngle {
         let angle = match self.drive {
-            Drive::Speed(_) => prescribed,
-            Drive::Torque { dof, .. } => q[dof],
+            Drive::Speed => prescribed,
+            Drive::Torque { dof } => q[dof],
         };
         ShaftAngle { hinge: self.hinge, second: self.shaft_second, angle }
     }

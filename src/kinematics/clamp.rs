@@ -1,4 +1,4 @@
-//! A clamp: nodes and edge angles that are held, or move as signals of time prescribe.
+//! A clamp: nodes and edge angles that are held, or move as a motion of signals prescribes.
 //!
 //! From `t0` to `t1` a clamp moves its nodes by the integral of a velocity and by the change of a displacement, turns nodes and frames
 //! like a rigid body about an axis, and spins edges about their own tangent:
@@ -67,6 +67,14 @@ impl Motion {
         }
         Ok(shift)
     }
+
+    /// Rotation from `t0` to `t1`, and the center at `t0`; none if the clamp does not turn.
+    fn turn(&self, t0: f64, t1: f64) -> Result<Option<(Rotation3<f64>, Vec3)>, SignalError> {
+        let Some(turning) = &self.turning else { return Ok(None) };
+        let angle = integral(&turning.rate, t0, t1)? + turning.angle.value(t1)? - turning.angle.value(t0)?;
+        let rotation = Rotation3::from_axis_angle(&Unit::new_normalize(turning.axis), angle);
+        Ok(Some((rotation, turning.center + self.shift(0.0, t0)?)))
+    }
 }
 
 fn integral(signal: &Signal, t0: f64, t1: f64) -> Result<f64, SignalError> {
@@ -93,29 +101,29 @@ pub struct Clamp {
     pub axes: [bool; 3],
     /// The edges.
     pub edges: Vec<ClampedEdge>,
-    /// The motion.
-    pub motion: Motion,
 }
 
 impl Clamp {
-    /// The signals that move it.
-    pub fn signals(&self) -> impl Iterator<Item = &Signal> {
-        self.motion.shifts().chain((!self.edges.is_empty()).then_some(&self.motion.spin))
+    /// The signals of a motion that move it.
+    pub fn signals<'a>(&self, motion: &'a Motion) -> impl Iterator<Item = &'a Signal> {
+        motion.shifts().chain((!self.edges.is_empty()).then_some(&motion.spin))
     }
 
-    /// Sets the clamped degrees of freedom at `t1`, later or earlier, from those at `t0` and the frames there; `spin` is the integral of that signal.
+    /// Sets the clamped degrees of freedom as a motion does by `t1`, later or earlier, from those at `t0` and the frames there; `spin` is the
+    /// integral of that signal.
     ///
     /// # Errors
     /// What a user's function fails with.
     pub fn advance(
         &self,
+        motion: &Motion,
         (t0, q): (f64, &[f64]),
         frames: &ReferenceFrames,
         (t1, spin): (f64, f64),
         target: &mut [f64],
     ) -> Result<(), SignalError> {
-        let shift = self.motion.shift(t0, t1)?;
-        let turn = self.turn(t0, t1)?;
+        let shift = motion.shift(t0, t1)?;
+        let turn = motion.turn(t0, t1)?;
         for &dof in &self.nodes {
             let from = node(q, dof);
             let to = turn.map_or(from, |(rotation, center)| center + rotation * (from - center)) + shift;
@@ -131,14 +139,6 @@ impl Clamp {
         }
         Ok(())
     }
-
-    /// Rotation from `t0` to `t1`, and the center at `t0`; none if the clamp does not turn.
-    fn turn(&self, t0: f64, t1: f64) -> Result<Option<(Rotation3<f64>, Vec3)>, SignalError> {
-        let Some(turning) = &self.motion.turning else { return Ok(None) };
-        let angle = integral(&turning.rate, t0, t1)? + turning.angle.value(t1)? - turning.angle.value(t0)?;
-        let rotation = Rotation3::from_axis_angle(&Unit::new_normalize(turning.axis), angle);
-        Ok(Some((rotation, turning.center + self.motion.shift(0.0, t0)?)))
-    }
 }
 
 #[cfg(test)]
@@ -153,17 +153,17 @@ mod tests {
         ReferenceFrames { tangents: vec![t], directors: vec![director], twists: vec![] }
     }
 
-    fn clamp(motion: Motion) -> Clamp {
+    fn clamp() -> Clamp {
         // One edge: nodes at 0 and 4, its angle at 3.
         let edges = vec![ClampedEdge { dof: 3, edge: 0, rigid: true }];
-        Clamp { nodes: vec![0, 4], axes: [true; 3], edges, motion }
+        Clamp { nodes: vec![0, 4], axes: [true; 3], edges }
     }
 
     const START: [f64; 7] = [1.0, 0.0, 0.0, 0.2, 2.0, 0.0, 0.0];
 
-    fn moved(clamp: &Clamp, t0: f64, t1: f64) -> [f64; 7] {
+    fn moved(clamp: &Clamp, motion: &Motion, t0: f64, t1: f64) -> [f64; 7] {
         let mut target = START;
-        clamp.advance((t0, &START), &frames(Vec3::x(), Vec3::y()), (t1, 0.0), &mut target).unwrap();
+        clamp.advance(motion, (t0, &START), &frames(Vec3::x(), Vec3::y()), (t1, 0.0), &mut target).unwrap();
         target
     }
 
@@ -175,7 +175,7 @@ mod tests {
             displacement: [Signal::Constant(7.0), table([0.0, 4.0]), Signal::Constant(0.0)],
             ..Motion::still()
         };
-        let found = moved(&clamp(motion), 0.5, 1.5);
+        let found = moved(&clamp(), &motion, 0.5, 1.5);
         assert_eq!(found, [1.5, 2.0, 0.0, 0.2, 2.5, 2.0, 0.0]);
     }
 
@@ -187,7 +187,7 @@ mod tests {
             rate: Signal::Constant(0.3),
             angle: Signal::Constant(0.0),
         };
-        let found = moved(&clamp(Motion { turning: Some(turning), ..Motion::still() }), 0.0, 2.0);
+        let found = moved(&clamp(), &Motion { turning: Some(turning), ..Motion::still() }, 0.0, 2.0);
         let expected = [1.0, 0.0, 0.0, 0.8, 2.0, 0.0, 0.0];
         found.iter().zip(expected).for_each(|(a, b)| assert!((a - b).abs() < 1e-15, "{found:?}"));
     }
@@ -200,7 +200,7 @@ mod tests {
             rate: Signal::Constant(0.0),
             angle: Signal::Table { times: vec![0.0, 1.0], values: vec![0.0, std::f64::consts::FRAC_PI_2] },
         };
-        let found = moved(&clamp(Motion { turning: Some(turning), ..Motion::still() }), 0.0, 1.0);
+        let found = moved(&clamp(), &Motion { turning: Some(turning), ..Motion::still() }, 0.0, 1.0);
         let expected = [0.0, 1.0, 0.0, 0.2, 0.0, 2.0, 0.0];
         found.iter().zip(expected).for_each(|(a, b)| assert!((a - b).abs() < 1e-15, "{found:?}"));
     }
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn free_coordinates_keep_what_they_are() {
         let motion = Motion { velocity: constant([1.0, 1.0, 1.0]), ..Motion::still() };
-        let slider = Clamp { axes: [false, true, true], ..clamp(motion) };
-        assert_eq!(moved(&slider, 0.0, 1.0), [1.0, 1.0, 1.0, 0.2, 2.0, 1.0, 1.0]);
+        let slider = Clamp { axes: [false, true, true], ..clamp() };
+        assert_eq!(moved(&slider, &motion, 0.0, 1.0), [1.0, 1.0, 1.0, 0.2, 2.0, 1.0, 1.0]);
     }
 }

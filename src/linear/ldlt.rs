@@ -1,5 +1,7 @@
 //! LDL^T of a symmetric sparse matrix on a fixed pattern: analysed once, refactored and solved without allocation.
 
+use std::sync::Arc;
+
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
 use faer::sparse::SparseColMatRef;
@@ -12,9 +14,29 @@ use super::LinearError;
 use super::pattern::Pattern;
 use super::sparse::view;
 
+/// Order of elimination and pattern of the factors: all that follows from the pattern of a matrix alone.
+pub struct Analysis(SymbolicCholesky<usize>);
+
+impl Analysis {
+    /// Analyses a pattern.
+    ///
+    /// # Errors
+    /// [`LinearError::Symbolic`] if it cannot be analysed.
+    pub fn new(pattern: &Pattern) -> Result<Self, LinearError> {
+        factorize_symbolic_cholesky(
+            view(pattern),
+            Side::Upper,
+            SymmetricOrdering::Amd,
+            CholeskySymbolicParams::default(),
+        )
+        .map(Self)
+        .map_err(|error| LinearError::Symbolic(format!("{error:?}")))
+    }
+}
+
 /// Sparse LDL^T without pivoting; only the upper triangle of the matrix is read.
 pub struct SparseLdlt {
-    symbolic: SymbolicCholesky<usize>,
+    analysis: Arc<Analysis>,
     values: Vec<f64>,
     memory: MemBuffer,
     factored: bool,
@@ -26,18 +48,17 @@ impl SparseLdlt {
     /// # Errors
     /// [`LinearError::Symbolic`] if the pattern cannot be analysed.
     pub fn new(pattern: &Pattern) -> Result<Self, LinearError> {
-        let symbolic = factorize_symbolic_cholesky(
-            view(pattern),
-            Side::Upper,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .map_err(|error| LinearError::Symbolic(format!("{error:?}")))?;
+        Ok(Self::of(Arc::new(Analysis::new(pattern)?)))
+    }
+
+    /// Memory for factors whose pattern has been analysed; many may share the analysis.
+    pub fn of(analysis: Arc<Analysis>) -> Self {
+        let symbolic = &analysis.0;
         let memory = MemBuffer::new(StackReq::any_of(&[
             symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default()),
             symbolic.solve_in_place_scratch::<f64>(3, Par::Seq),
         ]));
-        Ok(Self { values: vec![0.0; symbolic.len_val()], symbolic, memory, factored: false })
+        Self { values: vec![0.0; symbolic.len_val()], analysis, memory, factored: false }
     }
 
     /// Factors the matrix with these values on the pattern the analysis was made for.
@@ -49,7 +70,8 @@ impl SparseLdlt {
         if !values.iter().all(|value| value.is_finite()) {
             return Err(LinearError::Singular { what: "sparse" });
         }
-        self.symbolic
+        self.analysis
+            .0
             .factorize_numeric_ldlt(
                 &mut self.values,
                 SparseColMatRef::new(view(pattern), values),
@@ -73,7 +95,7 @@ impl SparseLdlt {
             return Err(LinearError::Singular { what: "sparse" });
         }
         let rows = x.len();
-        LdltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+        LdltRef::new(&self.analysis.0, &self.values).solve_in_place_with_conj(
             Conj::No,
             MatMut::from_column_major_slice_mut(x, rows, 1),
             Par::Seq,

@@ -1,7 +1,9 @@
 //! Sparse systems that are symmetric but for a few entries: LDL^T as long as its solutions are right, LU where not.
 
+use std::sync::Arc;
+
 use super::LinearError;
-use super::ldlt::SparseLdlt;
+use super::ldlt::{Analysis, SparseLdlt};
 use super::pattern::Pattern;
 use super::sparse::SparseLu;
 
@@ -10,7 +12,7 @@ const TRUSTED: f64 = 1e-3;
 
 /// Factorizations of a matrix on a fixed pattern, and the matrix itself, whose solutions are checked against it.
 pub struct NearlySymmetric {
-    pattern: Pattern,
+    pattern: Arc<Pattern>,
     values: Vec<f64>,
     ldlt: SparseLdlt,
     /// Analysed when first needed: most scenes never do.
@@ -29,14 +31,20 @@ impl NearlySymmetric {
     /// # Errors
     /// [`LinearError::Symbolic`] if the pattern cannot be analysed.
     pub fn new(pattern: Pattern) -> Result<Self, LinearError> {
-        Ok(Self {
+        let analysis = Arc::new(Analysis::new(&pattern)?);
+        Ok(Self::of(Arc::new(pattern), analysis))
+    }
+
+    /// Memory for a matrix on a pattern that has been analysed; many may share both.
+    pub fn of(pattern: Arc<Pattern>, analysis: Arc<Analysis>) -> Self {
+        Self {
             values: vec![0.0; pattern.entries()],
-            ldlt: SparseLdlt::new(&pattern)?,
+            ldlt: SparseLdlt::of(analysis),
             lu: None,
             pivoted: false,
             residual: vec![0.0; pattern.size()],
             pattern,
-        })
+        }
     }
 
     /// The matrix on the pattern, to be filled before [`Self::factor`].

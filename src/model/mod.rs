@@ -3,52 +3,48 @@
 //! * [`specification`]: a scene as plain data.
 //! * [`contact`]: how rods are kept apart.
 //! * [`filaments`]: the parts of a scene that move on their own, and their sizes; `round_off`: how exactly forces are known.
+//! * `parts`: connected parts.
 //! * `scene_terms`: the terms that a scene asks for.
-//! * `breaks`: instants at which what drives a scene has a corner or a jump.
+//! * `storage`: where the derivative of the force balance is stored.
 
-pub(crate) mod breaks;
 pub mod contact;
 pub mod filaments;
+mod parts;
 pub(crate) mod round_off;
 pub(crate) mod scene_terms;
 pub mod specification;
+pub(crate) mod storage;
 
 use crate::Vec3;
-use crate::bdf::control::Control;
-use crate::bdf::history::History;
 use crate::contact::potential::BarrierLaw;
 use crate::elastic::bending::Bending;
 use crate::elastic::hinges::Hinges;
 use crate::elastic::stretching::Stretching;
 use crate::elastic::twisting::Twisting;
-use crate::fluid::FluidModel;
-use crate::fluid::ambient::{Ambient, AmbientFlow};
 use crate::fluid::head::MOST_EDGES;
 use crate::fluid::product::FarFieldChoice;
 use crate::fluid::rft::ResistiveForce;
 use crate::fluid::rss::StokesletSegments;
+use crate::fluid::{FluidModel, immersed_part};
+use crate::forces::channels::Channels;
 use crate::forces::inertia::Inertia;
-use crate::forces::inputs as load;
 use crate::forces::motors::{Drive, Motor};
 use crate::kinematics::clamp::{Clamp, ClampedEdge};
 use crate::linear::LinearError;
 use crate::linear::pattern::Pattern;
-use crate::model::breaks::Breaks;
 use crate::model::contact::{ContactModel, Overlap};
 use crate::model::filaments::Filaments;
+use crate::model::parts::parts;
 use crate::model::round_off::RoundOff;
 use crate::model::scene_terms::{dissipative_terms, load_terms, masses, regularization, spin_resistances, weights};
 use crate::model::specification::{
-    ContactMethodSpecification, ContactSpecification, FlowSpecification, FluidModelSpecification, Specification,
-    WallSpecification,
+    ContactMethodSpecification, ContactSpecification, FluidModelSpecification, Specification, WallSpecification,
 };
+use crate::model::storage::Storage;
 use crate::rod::assembly::{HingeElement, Term};
 use crate::rod::configuration::{Configuration, ShaftAngle};
 use crate::rod::network::{Network, NetworkError};
 use crate::rod::reference::ReferenceFrames;
-use crate::signal::SignalError;
-use crate::state::State;
-use crate::step::budget::{self, Account};
 use std::f64::consts::PI;
 
 /// A model cannot be built from its specification.
@@ -103,8 +99,7 @@ pub struct Model {
     pub(crate) motors: Vec<Motor>,
     pub(crate) clamps: Vec<Clamp>,
     pub(crate) prescribed: Vec<bool>,
-    pub(crate) breaks: Breaks,
-    pub(crate) pattern: Pattern,
+    pub(crate) storage: Storage,
     pub(crate) filaments: Filaments,
     /// Turns residuals into forces: 1 for positions, one over a length for angles.
     pub(crate) force_weight: Vec<f64>,
@@ -113,8 +108,8 @@ pub struct Model {
     pub(crate) round_off: RoundOff,
     pub(crate) mass: Vec<f64>,
     pub(crate) contact: Option<ContactModel>,
-    pub(crate) inputs: load::Inputs,
-    pub(crate) flows: Vec<Box<dyn AmbientFlow>>,
+    /// Number of signals that loads follow.
+    pub(crate) load_channels: usize,
     /// Weights less buoyancy on every degree of freedom, N.
     pub(crate) weights: Vec<f64>,
     /// Connected part of every node, and which parts nothing holds.
@@ -130,11 +125,11 @@ fn expect(field: &'static str, length: usize, expected: usize) -> Result<(), Mod
 }
 
 impl Model {
-    /// Builds the model and its initial state.
+    /// Builds the model.
     ///
     /// # Errors
     /// [`ModelError`] naming what is not valid.
-    pub fn new(specification: Specification) -> Result<(Self, State), ModelError> {
+    pub fn new(specification: Specification) -> Result<Self, ModelError> {
         let network = Network::new(specification.nodes.len(), &specification.edges, &specification.hinges)?;
         check(&specification)?;
         let dof_count = network.dof_count() + specification.motors.iter().filter(|motor| motor.by_torque).count();
@@ -148,8 +143,8 @@ impl Model {
         let mass = masses(&specification, &network, dof_count, &rest.lengths);
         let mut inertia = Inertia::new(mass.clone());
         let mut dissipative = dissipative_terms(&specification, &network, dof_count, &rest.lengths);
-        let mut inputs = load::Inputs::default();
-        dissipative.extend(load_terms(&specification, &network, &rest.lengths, &mut inputs));
+        let mut channels = Channels::default();
+        dissipative.extend(load_terms(&specification, &network, &rest.lengths, &mut channels));
         let mut stencils: Vec<Vec<usize>> = stretching.stencils();
         stencils.extend(hinges.stencils());
         stencils.extend(dissipative.iter().flat_map(|term| term.stencils()));
@@ -168,15 +163,14 @@ impl Model {
             .contact
             .as_ref()
             .map(|contact| ContactModel::new(contact, &specification, &network, &rest.lengths));
-        let state = initial_state(&specification, &network, dof_count);
         let held: Vec<bool> = (0..network.node_count()).map(|k| prescribed[network.node_dofs()[k]]).collect();
-        let (part_of_node, mut free_parts) = budget::parts(network.edges(), &held, contact.is_some());
+        let (part_of_node, mut free_parts) = parts(network.edges(), &held, contact.is_some());
         let turned = network.edges().iter().zip(network.edge_dofs()).filter(|(_, dof)| prescribed[**dof]);
         turned.for_each(|(&[i, _], _)| free_parts[part_of_node[i]] = false);
-        let turning = clamps.iter().filter(|clamp| !clamp.edges.is_empty()).map(|clamp| &clamp.motion.spin);
-        let others = clamps.iter().flat_map(|clamp| clamp.motion.shifts()).chain(inputs.signals());
+        let immersed = immersed_nodes(&specification);
+        let fluid_dofs = immersed.iter().map(|&node| network.node_dofs()[node]).collect();
         let model = Self {
-            breaks: Breaks::new(&motors, turning, others),
+            storage: Storage::new(pattern, network.node_dofs(), fluid_dofs, &prescribed)?,
             weights: weights(&specification, &network, dof_count, &rest.lengths),
             part_of_node,
             free_parts,
@@ -189,7 +183,6 @@ impl Model {
             motors,
             clamps,
             prescribed,
-            pattern,
             mass,
             error_weight: filaments.error_weights(&force_weight),
             filaments,
@@ -197,21 +190,15 @@ impl Model {
             force_weight,
             contact,
             network,
-            inputs,
-            flows: specification.flows.iter().map(FlowSpecification::flow).collect(),
+            load_channels: channels.count(),
             specification,
         };
-        let mut configuration = Configuration::new(&model.network, model.dof_count);
-        if !configuration.update(&model.network, &state.q, &state.frames, &model.shafts(&state.motor_angles, &state.q))
-        {
-            return Err(ModelError::Shape { shape: "nodes" });
-        }
-        Ok((model, state))
+        Ok(model)
     }
 
-    /// The deepest overlap of a state from which contact cannot go on.
-    pub(crate) fn overlap(&self, state: &State) -> Option<Overlap> {
-        self.contact.as_ref()?.overlap(&state.positions(&self.network))
+    /// The deepest overlap of nodes (m) from which contact cannot go on.
+    pub(crate) fn overlap(&self, nodes: &[Vec3]) -> Option<Overlap> {
+        self.contact.as_ref()?.overlap(nodes)
     }
 
     /// The law of barrier contact, if there is any.
@@ -246,7 +233,7 @@ impl Model {
 
     /// Sparsity pattern of the derivative.
     pub fn pattern(&self) -> &Pattern {
-        &self.pattern
+        &self.storage.pattern
     }
 
     /// Names of the active terms.
@@ -259,16 +246,6 @@ impl Model {
     /// Angles of all shafts.
     pub(crate) fn shafts(&self, angles: &[f64], q: &[f64]) -> Vec<ShaftAngle> {
         self.motors.iter().zip(angles).map(|(motor, &angle)| motor.shaft(angle, q)).collect()
-    }
-
-    /// The background flow where the nodes are, if there is any.
-    pub(crate) fn ambient(&self, nodes: &[Vec3], time: f64) -> Result<Option<Ambient>, SignalError> {
-        if self.flows.is_empty() {
-            return Ok(None);
-        }
-        let mut ambient = Ambient::default();
-        ambient.update(&self.flows, nodes, self.network.edges(), time)?;
-        Ok(Some(ambient))
     }
 
     /// A fresh drag model, with its own workspace.
@@ -295,15 +272,18 @@ impl Model {
                 let (immersed, far_field) = (&fluid.immersed, choice.unwrap_or(far_field));
                 let model =
                     StokesletSegments::new(nodes, edges, immersed, epsilon, fluid.viscosity, &local, far_field)?;
-                let head = self.specification.head.as_ref().zip(self.specification.head_near_wall());
-                let head = head.map(|(head, near)| (head.node, near.least_height(head.translation)));
                 Box::new(match self.specification.boundary() {
-                    Some(boundary) => model.with_boundary(boundary, head),
+                    Some(boundary) => model.with_boundary(boundary),
                     None => model,
                 })
             }
         }))
     }
+}
+
+/// Ascending nodes of the immersed edges.
+fn immersed_nodes(specification: &Specification) -> Vec<usize> {
+    specification.fluid.as_ref().map_or_else(Vec::new, |fluid| immersed_part(&specification.edges, &fluid.immersed).0)
 }
 
 /// Slender-body coefficients with the logarithm of the mean edge's aspect ratio: a guess good enough to precondition with.
@@ -375,6 +355,9 @@ fn check_walls(specification: &Specification) -> Result<(), ModelError> {
         Some(FluidModelSpecification::ResistiveForce { .. }) if felt > 0 => {
             "none that the fluid feels, with resistive force theory"
         }
+        Some(_) if felt > 0 && specification.head.as_ref().is_some_and(|head| head.translation > 0.0) => {
+            "none that the fluid feels, with a point head, which stirs no flow"
+        }
         Some(_) if felt > 1 => "at most one that the fluid feels",
         _ if count > 0 && specification.contact.as_ref().is_some_and(spillmann) => "none, with this contact method",
         _ => return Ok(()),
@@ -431,12 +414,14 @@ impl RestShape {
     }
 }
 
-fn shape_frames(specification: &Specification, network: &Network, nodes: &[Vec3]) -> ReferenceFrames {
+/// Reference frames of a shape.
+pub(crate) fn shape_frames(specification: &Specification, network: &Network, nodes: &[Vec3]) -> ReferenceFrames {
     let first = |edge: usize| specification.directors.iter().find(|(k, _)| *k == edge).map(|(_, director)| *director);
     ReferenceFrames::of_shape(network, nodes, &first)
 }
 
-fn coordinates(network: &Network, nodes: &[Vec3], theta: &[f64], dof_count: usize) -> Vec<f64> {
+/// Degrees of freedom of positions (m) and edge angles (rad).
+pub(crate) fn coordinates(network: &Network, nodes: &[Vec3], theta: &[f64], dof_count: usize) -> Vec<f64> {
     let mut q = vec![0.0; dof_count];
     for (node, &dof) in nodes.iter().zip(network.node_dofs()) {
         q[dof..dof + 3].copy_from_slice(node.as_slice());
@@ -445,24 +430,6 @@ fn coordinates(network: &Network, nodes: &[Vec3], theta: &[f64], dof_count: usiz
         q[dof] = angle;
     }
     q
-}
-
-fn initial_state(specification: &Specification, network: &Network, dof_count: usize) -> State {
-    State {
-        time: 0.0,
-        steps: 0,
-        q: coordinates(network, &specification.nodes, &specification.theta, dof_count),
-        velocity: vec![0.0; dof_count],
-        density: Vec::new(),
-        control: Control::default(),
-        history: History::default(),
-        frames: shape_frames(specification, network, &specification.nodes),
-        tensions: vec![0.0; network.edges().len()],
-        motor_angles: vec![0.0; specification.motors.len()],
-        contacts: Vec::new(),
-        account: Account::default(),
-        contact_anchor: Vec::new(),
-    }
 }
 
 fn motors(specification: &Specification, first_free: usize) -> Vec<Motor> {
@@ -475,9 +442,9 @@ fn motors(specification: &Specification, first_free: usize) -> Vec<Motor> {
             shaft_second: motor.shaft_second,
             drive: if motor.by_torque {
                 next += 1;
-                Drive::Torque { signal: motor.signal.clone(), dof: next - 1 }
+                Drive::Torque { dof: next - 1 }
             } else {
-                Drive::Speed(motor.signal.clone())
+                Drive::Speed
             },
         })
         .collect()
@@ -485,11 +452,11 @@ fn motors(specification: &Specification, first_free: usize) -> Vec<Motor> {
 
 fn free_angle(motors: &[Motor], hinge: usize) -> Option<(usize, usize, f64)> {
     motors.iter().filter(|motor| motor.hinge == hinge).find_map(|motor| match motor.drive {
-        Drive::Torque { dof, .. } => {
+        Drive::Torque { dof } => {
             let (row, sign) = Motor::angle_row(motor.shaft_second);
             Some((dof, row, sign))
         }
-        Drive::Speed(_) => None,
+        Drive::Speed => None,
     })
 }
 
@@ -514,7 +481,7 @@ fn clamps(specification: &Specification, network: &Network, dof_count: usize) ->
                 (0..3).filter(|&c| clamp.axes[c]).for_each(|c| prescribed[dof + c] = true);
             }
             edges.iter().for_each(|edge| prescribed[edge.dof] = true);
-            Clamp { nodes, axes: clamp.axes, edges, motion: clamp.motion.clone() }
+            Clamp { nodes, axes: clamp.axes, edges }
         })
         .collect();
     (clamps, prescribed)

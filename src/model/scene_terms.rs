@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use crate::Vec3;
 use crate::fluid::head::Head;
 use crate::fluid::twist_drag::TwistDrag;
+use crate::forces::channels::Channels;
 use crate::forces::follower::{FollowerForce, FollowerTorque};
-use crate::forces::inputs as load;
 use crate::forces::laboratory::{EdgeTorque, NodeForce};
 use crate::forces::magnetic::Magnetism;
 use crate::forces::weight::Weight;
@@ -59,11 +59,7 @@ pub(crate) fn dissipative_terms(
     }
     if let Some(head) = &specification.head {
         let drag = [head.translation, head.rotation];
-        let term = Head::new(network, head.node, head.edges.clone(), lengths, drag);
-        terms.push(Box::new(match specification.head_near_wall() {
-            Some(plane) => term.near(plane),
-            None => term,
-        }));
+        terms.push(Box::new(Head::new(network, head.node, head.edges.clone(), lengths, drag)));
     }
     let forces = weights(specification, network, dof_count, lengths);
     if forces.iter().any(|&force| force != 0.0) {
@@ -104,16 +100,16 @@ pub(crate) fn weights(specification: &Specification, network: &Network, dof_coun
     forces
 }
 
-/// Terms of loads that follow signals.
+/// Terms of loads that follow signals: three channels for every load, then three for the magnetic field, as [`crate::inputs::Inputs`] has them.
 pub(crate) fn load_terms(
     specification: &Specification,
     network: &Network,
     lengths: &[f64],
-    inputs: &mut load::Inputs,
+    channels: &mut Channels,
 ) -> Vec<Box<dyn Term>> {
     let mut terms: Vec<Box<dyn Term>> = Vec::new();
     for load in &specification.loads {
-        let channels = inputs.add_vector(load.signal.clone());
+        let channels = channels.take_vector();
         // Per length: half of an edge's share goes to each of its nodes.
         let halves = |edge: usize| (edge, [0.5 * lengths[edge]; 2]);
         let whole = |edge: usize| (edge, lengths[edge]);
@@ -150,7 +146,7 @@ pub(crate) fn load_terms(
         terms.push(term);
     }
     if let Some(magnetism) = &specification.magnetism {
-        let channels = inputs.add_vector(magnetism.field.clone());
+        let channels = channels.take_vector();
         terms.push(Box::new(Magnetism::new(network, magnetism.moments.clone(), channels, magnetism.gradient)));
     }
     terms

@@ -7,7 +7,6 @@ use crate::fluid::ambient::linear::LinearFlow;
 use crate::fluid::ambient::poiseuille::Poiseuille;
 use crate::fluid::kernel::Boundary;
 use crate::fluid::product::FarFieldChoice;
-use crate::fluid::small_body::NearPlane;
 use crate::kinematics::clamp::Motion;
 use crate::plane::Plane;
 use crate::signal::Signal;
@@ -223,12 +222,6 @@ impl Specification {
     /// The boundary of the fluid, if there is one.
     pub fn boundary(&self) -> Option<Boundary> {
         self.walls.iter().find_map(WallSpecification::boundary)
-    }
-
-    /// What the head's drag depends on near a wall.
-    pub fn head_near_wall(&self) -> Option<NearPlane> {
-        let (boundary, fluid) = self.boundary().zip(self.fluid.as_ref())?;
-        Some(NearPlane { boundary, viscosity: fluid.viscosity })
     }
 }
 

@@ -1,7 +1,9 @@
-//! Systems of nonlinear equations.
+//! Systems of nonlinear equations; knows nothing of rods.
 //!
+//! * [`equations`]: what a solver needs to know of a system.
 //! * [`newton`]: Newton's method with line search.
-//! * [`continuation`]: Newton's method led to the turn of friction over wider ones.
+//! * [`continuation`]: Newton's method on systems that turn sharply, led there over smoother ones.
 
-pub(crate) mod continuation;
-pub(crate) mod newton;
+pub mod continuation;
+pub mod equations;
+pub mod newton;

@@ -1,26 +1,15 @@
-//! Newton's method with line search on the force balance of a step.
+//! Newton's method with line search.
 
+#[cfg(test)]
+mod tests;
+
+use super::equations::{Equations, Goal, Size};
 use crate::linear::LinearError;
-use crate::model::Model;
-use crate::rod::fault::fault;
-use crate::step::problem::{Balance, Step, Unknowns};
-use crate::step::saddle::Correction;
-use crate::step::statistics::Statistics;
-use crate::step::targets::Size;
-
-/// Where Newton's method stops.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Goal {
-    /// Largest residual force, relative to the largest force on the same filament: forces and torques then balance that well.
-    Residual(f64),
-    /// Largest displacement, relative to the size of its filament, by which the solution is still to be corrected. Tensions may
-    /// then be off by the axial stiffness times a strain that no one can see, as long as the nodes are where they should be.
-    Displacement(f64),
-}
 
 /// How far and how long Newton's method goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct NewtonSettings {
+pub struct NewtonSettings {
+    /// Where it stops.
     pub goal: Goal,
     /// Most iterations.
     pub max_iterations: usize,
@@ -34,10 +23,14 @@ impl Default for NewtonSettings {
 
 /// Why Newton's method gave up.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct NewtonFailure {
+pub struct NewtonFailure {
+    /// Largest entry of the residual that is left; not a number if there was none.
     pub residual: f64,
+    /// Iterations made.
     pub iterations: usize,
+    /// Number of the worst entry.
     pub worst: Option<usize>,
+    /// What went wrong.
     pub reason: String,
 }
 
@@ -48,9 +41,6 @@ const LINEAR_SHARE: f64 = 0.1;
 /// Loosest linear system, by goal: a residual that is to fall to its target, a correction that is to fall below its own.
 const LOOSEST: f64 = 1e-2;
 const LOOSEST_CORRECTION: f64 = 0.1;
-/// Change of a sliding velocity, over the larger of itself and the smoothing velocity, that may be left: where friction has
-/// turned over, the change that is asked for is half the smoothing velocity or more.
-const SLIP_SHARE: f64 = 0.1;
 /// How often, and by how much, the correction may grow under full steps.
 const UPHILL_ITERATIONS: usize = 3;
 const UPHILL: f64 = 2.0;
@@ -59,21 +49,34 @@ const BACKTRACKS: usize = 14;
 /// A residual this many times the target that no longer falls is accepted as converged.
 const STAGNATION: f64 = 100.0;
 
-/// Solves the balance from the guess `unknowns`, in place.
-pub(crate) fn solve(
-    balance: &mut Balance,
-    model: &Model,
-    step: &Step,
+/// Points that Newton's method needs besides its solution.
+pub struct NewtonWork<P> {
+    direction: P,
+    trial: P,
+}
+
+impl<P: Clone> NewtonWork<P> {
+    /// Workspace for points like this one.
+    pub fn new(like: &P) -> Self {
+        Self { direction: like.clone(), trial: like.clone() }
+    }
+}
+
+/// Solves the equations from the guess `at`, in place.
+///
+/// # Errors
+/// [`NewtonFailure`]; `at` is then the last point that was accepted.
+pub fn solve<E: Equations>(
+    equations: &mut E,
     settings: &NewtonSettings,
-    work: &mut NewtonWork,
-    unknowns: &mut Unknowns,
-    statistics: &mut Statistics,
+    work: &mut NewtonWork<E::Point>,
+    at: &mut E::Point,
 ) -> Result<(), NewtonFailure> {
-    balance.aim(model, step, settings.goal, &unknowns.q);
-    let mut newton = Newton { balance, model, step, work, unknowns, statistics };
+    equations.aim(settings.goal, at);
+    let mut newton = Newton { equations, work, at };
     match settings.goal {
         Goal::Residual(_) => newton.reduce_residual(settings.max_iterations),
-        Goal::Displacement(tolerance) => newton.reduce_correction(tolerance, settings.max_iterations),
+        Goal::Correction(tolerance) => newton.reduce_correction(tolerance, settings.max_iterations),
     }
 }
 
@@ -87,60 +90,45 @@ fn failure(size: Option<Size>, iterations: usize, reason: &str) -> NewtonFailure
 }
 
 /// The parts of one solve.
-struct Newton<'a, 'b> {
-    balance: &'a mut Balance,
-    model: &'a Model,
-    step: &'a Step<'b>,
-    work: &'a mut NewtonWork,
-    unknowns: &'a mut Unknowns,
-    statistics: &'a mut Statistics,
+struct Newton<'a, E: Equations> {
+    equations: &'a mut E,
+    work: &'a mut NewtonWork<E::Point>,
+    at: &'a mut E::Point,
 }
 
-impl Newton<'_, '_> {
+impl<E: Equations> Newton<'_, E> {
     fn evaluate_start(&mut self) -> Result<Size, NewtonFailure> {
-        let size = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
-        size.ok_or_else(|| {
-            let fault = fault(&self.model.network, &self.unknowns.q);
-            let reason = fault.as_ref().map_or("forces are too large to be numbers", |fault| fault.what);
-            let worst = fault.map(|fault| self.model.network.node_dofs()[fault.node]);
-            NewtonFailure { worst, ..failure(None, 0, reason) }
+        self.equations.evaluate(self.at).ok_or_else(|| {
+            let obstacle = self.equations.obstacle(self.at);
+            NewtonFailure { worst: obstacle.place, ..failure(None, 0, &obstacle.reason) }
         })
     }
 
     /// An error if the caller wants to stop.
     fn go_on(&mut self, size: Size, iteration: usize) -> Result<(), NewtonFailure> {
-        let stopped = self.balance.interrupt.requested();
-        if stopped { Err(failure(Some(size), iteration, "interrupted")) } else { Ok(()) }
+        if self.equations.stop_requested() { Err(failure(Some(size), iteration, "interrupted")) } else { Ok(()) }
     }
 
     /// Residual at the given part of the direction.
     fn try_length(&mut self, length: f64) -> Option<Size> {
-        self.work.try_length(self.unknowns, length);
-        self.balance.evaluate(self.model, self.step, &self.work.trial, self.statistics)
+        let NewtonWork { direction, trial } = self.work;
+        self.equations.advance(self.at, direction, length, trial);
+        self.equations.evaluate(trial)
     }
 
-    /// The part of the direction that contact allows.
+    /// The part of the direction that may be gone.
     fn full_length(&mut self) -> f64 {
-        self.work.try_length(self.unknowns, 1.0);
-        self.balance.step_limit(self.model, &self.unknowns.q, &self.work.trial.q, self.statistics)
+        let NewtonWork { direction, trial } = self.work;
+        self.equations.advance(self.at, direction, 1.0, trial);
+        self.equations.longest_step(self.at, trial)
     }
 
     fn accept(&mut self) {
-        std::mem::swap(self.unknowns, &mut self.work.trial);
-    }
-
-    fn linearize(&mut self) -> Result<(), LinearError> {
-        self.statistics.newton_iterations += 1;
-        self.balance.linearize(self.model, self.step, &self.unknowns.tensions, self.statistics)
+        std::mem::swap(self.at, &mut self.work.trial);
     }
 
     fn find_direction(&mut self, tolerance: f64) -> Result<(), LinearError> {
-        let tensions = &self.unknowns.tensions;
-        self.balance.direction(self.model, self.step, tensions, tolerance, &mut self.work.direction, self.statistics)
-    }
-
-    fn correction(&mut self, tolerance: f64) -> Result<Correction, LinearError> {
-        self.balance.correction(self.model, self.step, tolerance, self.statistics)
+        self.equations.direction(self.at, tolerance, &mut self.work.direction)
     }
 
     fn reduce_residual(&mut self, max_iterations: usize) -> Result<(), NewtonFailure> {
@@ -150,9 +138,10 @@ impl Newton<'_, '_> {
             if size.excess <= 1.0 {
                 return Ok(());
             }
-            let merit = self.balance.weigh(self.model);
+            let merit = self.equations.weigh();
             let linear = (LINEAR_SHARE / size.excess).clamp(LINEAR_TOLERANCE, LOOSEST);
-            self.linearize()
+            self.equations
+                .linearize(self.at)
                 .and_then(|()| self.find_direction(linear))
                 .map_err(|error| failure(Some(size), iteration, &error.to_string()))?;
             let mut length = self.full_length();
@@ -164,11 +153,11 @@ impl Newton<'_, '_> {
             });
             let Some(lower) = lower else {
                 if size.excess <= STAGNATION {
-                    // The configuration is left at the last trial: bring it back to the accepted point.
-                    let _ = self.balance.evaluate(self.model, self.step, self.unknowns, self.statistics);
+                    // The equations are left at the last trial: bring them back to the accepted point.
+                    let _ = self.equations.evaluate(self.at);
                     return Ok(());
                 }
-                if self.balance.define_contact() {
+                if self.equations.use_definite_matrix() {
                     size = self.evaluate_start()?;
                     continue;
                 }
@@ -183,37 +172,36 @@ impl Newton<'_, '_> {
         Err(failure(Some(size), max_iterations, "too many iterations"))
     }
 
-    /// Newton's method that measures a residual by the displacement it asks for, with the factors at hand: residuals of stiff
+    /// Newton's method that measures a residual by the correction it asks for, with the factors at hand: residuals of stiff
     /// and of soft directions then count alike (the natural level function of Deuflhard, Newton Methods, 2004, section 3.3).
     fn reduce_correction(&mut self, tolerance: f64, max_iterations: usize) -> Result<(), NewtonFailure> {
         let mut size = self.evaluate_start()?;
-        self.balance.weigh(self.model);
+        self.equations.weigh();
         for iteration in 0..max_iterations {
             self.go_on(size, iteration)?;
             let broken = |error: LinearError| failure(Some(size), iteration, &error.to_string());
-            self.linearize().map_err(broken)?;
-            let correction = self.correction(tolerance).map_err(broken)?;
-            if correction.is_done(tolerance) {
+            self.equations.linearize(self.at).map_err(broken)?;
+            let correction = self.equations.correction(tolerance).map_err(broken)?;
+            if correction.negligible {
                 self.polish();
                 return Ok(());
             }
-            let correction = correction.size(tolerance);
-            let linear = (LINEAR_SHARE * tolerance / correction).clamp(LINEAR_TOLERANCE, LOOSEST_CORRECTION);
+            let linear = (LINEAR_SHARE * tolerance / correction.size).clamp(LINEAR_TOLERANCE, LOOSEST_CORRECTION);
             self.find_direction(linear).map_err(broken)?;
             let full = self.full_length();
             let mut length = full;
             let lower = (0..BACKTRACKS).find_map(|_| {
-                // The first full steps may go uphill: the test itself is blurred while edges still turn by much.
+                // The first full steps may go uphill: the test itself is blurred while unknowns still turn by much.
                 let uphill = if length == full && iteration < UPHILL_ITERATIONS { UPHILL } else { 1.0 - 0.25 * length };
-                let sufficient = uphill * correction;
+                let sufficient = uphill * correction.size;
                 let trial = self.try_length(length);
                 length *= 0.5;
-                let left = self.correction(tolerance).ok()?;
-                let better = left.is_done(tolerance) || left.size(tolerance) < sufficient;
+                let left = self.equations.correction(tolerance).ok()?;
+                let better = left.negligible || left.size < sufficient;
                 trial.filter(|_| better).map(|trial| (trial, left))
             });
             let Some((trial, left)) = lower else {
-                if self.balance.define_contact() {
+                if self.equations.use_definite_matrix() {
                     size = self.evaluate_start()?;
                     continue;
                 }
@@ -221,7 +209,7 @@ impl Newton<'_, '_> {
             };
             self.accept();
             size = trial;
-            if left.is_done(tolerance) {
+            if left.negligible {
                 self.polish();
                 return Ok(());
             }
@@ -229,56 +217,20 @@ impl Newton<'_, '_> {
         Err(failure(Some(size), max_iterations, "too many iterations"))
     }
 
-    /// Makes the correction that was measured last, which is small enough to be left: it is at hand, and with it the forces
-    /// balance far better. Strains that no one can see are tensions and torques that everyone can read.
+    /// Makes the correction that was measured last, which is small enough to be left: it is at hand, and with it the residual
+    /// is far smaller. Corrections that no one can see may be residuals that everyone can read.
     fn polish(&mut self) {
-        let Self { balance, model, step, work, unknowns, .. } = self;
-        if balance.last_correction(model, step, &unknowns.tensions, &mut work.direction).is_err() {
+        let NewtonWork { direction, trial } = self.work;
+        if self.equations.last_correction(self.at, direction).is_err() {
             return;
         }
-        work.try_length(unknowns, 1.0);
-        let free = balance.step_limit(model, &unknowns.q, &work.trial.q, self.statistics) >= 1.0;
-        if free && balance.place(model, step, &work.trial.q) {
-            std::mem::swap(*unknowns, &mut work.trial);
+        self.equations.advance(self.at, direction, 1.0, trial);
+        let free = self.equations.longest_step(self.at, trial) >= 1.0;
+        if free && self.equations.place(trial) {
+            self.accept();
         } else {
-            // The configuration goes back to what is kept.
-            balance.place(model, step, &unknowns.q);
+            // The equations go back to what is kept.
+            self.equations.place(self.at);
         }
-    }
-}
-
-impl Correction {
-    /// Whether neither displacements nor sliding velocities still matter. While a contact sticks, displacements are small however
-    /// large the force is that should make it slide: they alone do not tell.
-    fn is_done(&self, tolerance: f64) -> bool {
-        self.length <= tolerance && self.slip.relative <= SLIP_SHARE
-    }
-
-    /// One measure of both, linear in the correction: what the line search reduces.
-    fn size(&self, tolerance: f64) -> f64 {
-        self.length.max(tolerance * self.slip.over_smoothing / SLIP_SHARE)
-    }
-}
-
-/// Vectors of Newton's method.
-pub(crate) struct NewtonWork {
-    direction: Unknowns,
-    trial: Unknowns,
-}
-
-impl NewtonWork {
-    pub fn new(like: &Unknowns) -> Self {
-        Self { direction: like.clone(), trial: like.clone() }
-    }
-
-    fn try_length(&mut self, from: &Unknowns, length: f64) {
-        let move_along = |trial: &mut [f64], start: &[f64], direction: &[f64]| {
-            for ((trial, start), direction) in trial.iter_mut().zip(start).zip(direction) {
-                *trial = start + length * direction;
-            }
-        };
-        move_along(&mut self.trial.q, &from.q, &self.direction.q);
-        move_along(&mut self.trial.density, &from.density, &self.direction.density);
-        move_along(&mut self.trial.tensions, &from.tensions, &self.direction.tensions);
     }
 }

@@ -4,12 +4,14 @@
 //! * [`simulation`]: the simulation class.
 //! * [`force`]: a function that is asked for forces.
 //! * [`loads`]: loads, magnetism and background flows from mappings.
+//! * [`body`]: the surface of a rigid body.
 //! * [`far_field`]: the product with the mobility without its matrix.
 //! * [`numerics`]: mobility, velocity and distances on plain arrays; [`walls`]: walls from mappings.
 //! * [`errors`]: errors of the core as Python exceptions.
 //! * [`arrays`]: positions and indices in and out of NumPy.
 
 mod arrays;
+mod body;
 mod errors;
 mod far_field;
 mod force;
@@ -27,6 +29,7 @@ fn _flagrs(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<far_field::FastMobility>()?;
+    module.add_class::<body::BodySurface>()?;
     module.add_function(wrap_pyfunction!(numerics::mobility, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::velocity, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::image_velocity, module)?)?;

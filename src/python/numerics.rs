@@ -56,43 +56,44 @@ fn boundary(py: Python<'_>, wall: Option<WallInput>) -> PyResult<Option<Boundary
     Ok(wall.map(|wall| wall.specification(py)).transpose()?.and_then(|wall| wall.boundary()))
 }
 
-/// Velocity at the points, (M, 3).
+/// Velocity at the points, (M, 3), for a force density over `8 pi mu`.
 #[pyfunction]
 pub fn velocity<'py>(
     py: Python<'py>,
     at: PyReadonlyArray2<'py, f64>,
     nodes: PyReadonlyArray2<'py, f64>,
     edges: PyReadonlyArray2<'py, i64>,
-    force_density: PyReadonlyArray2<'py, f64>,
-    viscosity: f64,
+    density: PyReadonlyArray2<'py, f64>,
     epsilon: PyReadonlyArray1<'py, f64>,
     threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let at = points(py, "points", &at)?;
     let nodes = points(py, "nodes", &nodes)?;
-    let density = points(py, "force_density", &force_density)?;
+    let density = points(py, "force_density", &density)?;
     let edges = pairs(py, "edges", &edges, nodes.len())?;
     let epsilon = regularizations(py, &epsilon, edges.len())?;
     let mut out = vec![crate::Vec3::zeros(); at.len()];
     py.detach(|| {
         let pool = threads::pool(threads);
-        stokeslet::velocity(&at, &nodes, &edges, &density, viscosity, &epsilon, &mut out, pool.as_deref());
+        stokeslet::velocity(&at, &nodes, &edges, &density, &epsilon, &mut out, pool.as_deref());
     });
     from_points(py, &out)
 }
+
+/// Nodes, edges and regularizations of segments.
+type SegmentArrays<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, i64>, PyReadonlyArray1<'py, f64>);
 
 /// What the images behind a wall add to the velocity at the points, (M, 3), of a force density over 8 pi mu.
 #[pyfunction]
 pub fn image_velocity<'py>(
     py: Python<'py>,
     at: PyReadonlyArray2<'py, f64>,
-    nodes: PyReadonlyArray2<'py, f64>,
-    edges: PyReadonlyArray2<'py, i64>,
+    segments: SegmentArrays<'py>,
     density: PyReadonlyArray2<'py, f64>,
-    epsilon: PyReadonlyArray1<'py, f64>,
     wall: WallInput,
     threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (nodes, edges, epsilon) = segments;
     let at = points(py, "points", &at)?;
     let nodes = points(py, "nodes", &nodes)?;
     let density = points(py, "force_density", &density)?;

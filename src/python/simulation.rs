@@ -9,13 +9,13 @@ use pyo3::types::PyDict;
 use super::arrays::{from_flat, from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error};
 use super::specification::SceneInput;
-use crate::bdf::control::Control;
+use crate::bdf::control::{Control, NO_CEILING};
 use crate::bdf::history::{History, Sample};
 use crate::rod::reference::ReferenceFrames;
 use crate::simulation as core;
 use crate::simulation::failure::StepError;
 use crate::state::State;
-use crate::step::budget::Account;
+use crate::state::account::Account;
 use crate::step::scheme::Scheme;
 
 /// A running simulation; the class `flagrs.Simulation` wraps it.
@@ -302,10 +302,9 @@ impl Simulation {
     /// Takes over a state saved by `state()` of a simulation of the same scene.
     fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
         saved.check_shapes(py, self.inner.model().dof_count())?;
-        let flow = self.inner.state().density.len();
         let account = Account::from_numbers(&values(&saved.account))
             .ok_or_else(|| scene_error(py, "state", "an account of another length", "what state() returned"))?;
-        let mut state = State {
+        let state = State {
             time: first(&saved.time),
             steps: saved.steps.as_array().first().copied().unwrap_or(0),
             q: values(&saved.q),
@@ -324,12 +323,6 @@ impl Simulation {
             account,
             contact_anchor: points(py, "contact_anchor", &saved.contact_anchor)?,
         };
-        // Schemes without a force density of their own save an empty one; the next step finds it.
-        let kept = state.density.len();
-        if kept != flow && (kept == 0 || flow == 0) {
-            state.density = vec![0.0; flow];
-            state.history.past.iter_mut().for_each(|sample| sample.density = vec![0.0; flow]);
-        }
         self.inner.adopt(state).map_err(|error| model_error(py, &error))
     }
 }
@@ -405,7 +398,7 @@ fn control(saved: &StateInput<'_>) -> Control {
     Control {
         dt: first(&saved.control_step),
         order: whole(&saved.control_order),
-        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).unwrap_or(f64::INFINITY),
+        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).map_or(NO_CEILING, |ceiling| ceiling.min(NO_CEILING)),
         at_jump: number(2).is_some_and(|flag| flag != 0.0),
     }
 }

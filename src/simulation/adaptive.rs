@@ -4,14 +4,17 @@ use std::time::Instant;
 
 use crate::bdf::control::Control;
 use crate::bdf::history::History;
-use crate::inputs::first_jump;
-use crate::nonlinear::newton::{Goal, NewtonSettings};
+use crate::inputs::over_step::first_jump;
+use crate::nonlinear::equations::Goal;
+use crate::nonlinear::newton::NewtonSettings;
 use crate::simulation::Simulation;
 use crate::simulation::failure::{StepError, TryError};
 
 /// First adaptive step and smallest one, in steps of fixed size.
 const FIRST_STEP: f64 = 1e-2;
 const SMALLEST_STEP: f64 = 1e-13;
+/// Longest adaptive step, in steps of fixed size: where nothing moves, nothing else bounds it.
+pub(super) const LONGEST_STEP: f64 = 1e9;
 /// Length of a step over which nothing but jumps happens, in steps of fixed size and in what is left of the run.
 const INSTANT: f64 = 1e-9;
 /// Rejections at a time before past states are given up.
@@ -32,7 +35,7 @@ impl Simulation {
         self.settings = NewtonSettings::default();
         if let Some(error) = tolerance {
             self.settings =
-                NewtonSettings { goal: Goal::Displacement(NEWTON_SHARE * error), max_iterations: MOST_ITERATIONS };
+                NewtonSettings { goal: Goal::Correction(NEWTON_SHARE * error), max_iterations: MOST_ITERATIONS };
         }
     }
 
@@ -62,22 +65,29 @@ impl Simulation {
 
     /// At a corner or jump of what drives the scene, past states tell nothing of the next ones.
     fn begin_anew_at_a_break(&mut self) {
-        let Control { dt, ceiling, at_jump, .. } = self.state.control;
+        let Control { dt, at_jump, .. } = self.state.control;
         if dt == 0.0 {
             // Nothing is known yet of how fast things change.
             self.state.control.dt = FIRST_STEP * self.dt;
         } else if !self.state.history.past.is_empty()
-            && (at_jump || self.model.breaks.at(self.state.time, dt, self.angle_tolerance()))
+            && (at_jump || self.inputs.breaks().at(self.state.time, dt, self.angle_tolerance()))
         {
-            self.state.history = History::default();
-            self.state.control = Control { dt: STEP_AFTER_BREAK * dt, order: 1, ceiling, at_jump: false };
+            self.begin_anew();
         }
+    }
+
+    /// Forgets past states, and begins with a short step.
+    pub(super) fn begin_anew(&mut self) {
+        let Control { dt, ceiling, .. } = self.state.control;
+        self.state.history = History::default();
+        self.state.control = Control { dt: STEP_AFTER_BREAK * dt, order: 1, ceiling, at_jump: false };
     }
 
     /// Where a step of the wanted length ends: before the limit and the next break, or exactly there.
     fn end_of_step(&self, wanted: f64, limit: f64) -> f64 {
         let now = self.state.time;
-        let stop = self.model.breaks.next(now, 2.0 * wanted, self.angle_tolerance()).map_or(limit, |at| at.min(limit));
+        let stop =
+            self.inputs.breaks().next(now, 2.0 * wanted, self.angle_tolerance()).map_or(limit, |at| at.min(limit));
         let left = stop - now;
         // Two equal steps to there rather than a whole one and a sliver.
         if wanted >= left {
@@ -92,7 +102,7 @@ impl Simulation {
     /// The same, and whether a jump that a function of time makes on the way ends the step there.
     fn end_before_jump(&self, wanted: f64, limit: f64) -> Result<(f64, bool), StepError> {
         let end = self.end_of_step(wanted, limit);
-        let jump = first_jump(&self.model, (self.state.time, end)).map_err(StepError::Signal)?;
+        let jump = first_jump(&self.model, &self.inputs, (self.state.time, end)).map_err(StepError::Signal)?;
         Ok((jump.unwrap_or(end), jump.is_some()))
     }
 

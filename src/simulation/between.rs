@@ -1,8 +1,9 @@
 //! States between adaptive steps: interpolated, then brought into the balance of forces that steps keep.
 
-use crate::forces::motors::Drive;
+use crate::forces::motors::{Drive, Motor};
 use crate::model::contact::ContactModel;
-use crate::nonlinear::newton::Goal;
+use crate::nonlinear::equations::Goal;
+use crate::signal::Signal;
 use crate::simulation::Simulation;
 use crate::simulation::failure::StepError;
 use crate::state::State;
@@ -47,18 +48,18 @@ impl Simulation {
         past.extrapolate(order, (now, &self.state.q), |s| &s.q, time, &mut state.q);
         past.extrapolate(order, (now, &self.state.velocity), |s| &s.velocity, time, &mut state.velocity);
         past.extrapolate(order, (now, &self.state.density), |s| &s.density, time, &mut state.density);
-        for (k, motor) in self.model.motors.iter().enumerate() {
+        for (k, (motor, signal)) in self.model.motors.iter().zip(self.inputs.motors()).enumerate() {
             match &motor.drive {
-                Drive::Speed(signal) => {
+                Drive::Speed => {
                     state.motor_angles[k] -= signal.integral(time, now).map_err(StepError::Signal)?;
                 }
-                Drive::Torque { dof, .. } => state.motor_angles[k] = state.q[*dof],
+                Drive::Torque { dof } => state.motor_angles[k] = state.q[*dof],
             }
         }
-        for clamp in &self.model.clamps {
+        for (clamp, motion) in self.model.clamps.iter().zip(self.inputs.clamps()) {
             let mut back = || {
-                let spin = if clamp.edges.is_empty() { 0.0 } else { -clamp.motion.spin.integral(time, now)? };
-                clamp.advance((now, &self.state.q), &self.state.frames, (time, spin), &mut state.q)
+                let spin = if clamp.edges.is_empty() { 0.0 } else { -motion.spin.integral(time, now)? };
+                clamp.advance(motion, (now, &self.state.q), &self.state.frames, (time, spin), &mut state.q)
             };
             back().map_err(StepError::Signal)?;
         }
@@ -69,7 +70,7 @@ impl Simulation {
     /// Brings an interpolated state into balance, the forces on the fluid being what they are up to the change of rates. Without
     /// success it stays as it is.
     fn settle(&mut self, state: &mut State) {
-        let Goal::Displacement(goal) = self.settings.goal else { return };
+        let Goal::Correction(goal) = self.settings.goal else { return };
         if self.force.is_some() {
             // What a caller's function would give between steps is not known.
             return;
@@ -79,8 +80,12 @@ impl Simulation {
         else {
             return;
         };
-        let Ok(inputs) = self.model.inputs.values(state.time) else { return };
-        let Ok(ambient) = self.model.ambient(&state.positions(&self.model.network), state.time) else { return };
+        let Ok(inputs) = self.inputs.load_values(state.time) else { return };
+        let Ok(ambient) =
+            self.inputs.ambient(self.model.network.edges(), &state.positions(&self.model.network), state.time)
+        else {
+            return;
+        };
         let base = state.clone();
         let step = Step {
             scheme: self.scheme,
@@ -135,11 +140,11 @@ impl Simulation {
 
     /// Torques of torque-driven motors, N m, unless one of their functions fails.
     fn torques_at(&self, time: f64) -> Option<Vec<f64>> {
-        let torque = |drive: &Drive| match drive {
-            Drive::Torque { signal, .. } => signal.value(time).ok(),
-            Drive::Speed(_) => Some(0.0),
+        let torque = |(motor, signal): (&Motor, &Signal)| match motor.drive {
+            Drive::Torque { .. } => signal.value(time).ok(),
+            Drive::Speed => Some(0.0),
         };
-        self.model.motors.iter().map(|motor| torque(&motor.drive)).collect()
+        self.model.motors.iter().zip(self.inputs.motors()).map(torque).collect()
     }
 
     /// Rates of the interpolated rates.

@@ -61,9 +61,10 @@ impl Simulation {
         self.model
             .motors
             .iter()
-            .map(|motor| match &motor.drive {
-                Drive::Speed(signal) => signal.value(self.state.time),
-                Drive::Torque { dof, .. } => Ok(self.state.velocity[*dof]),
+            .zip(self.inputs.motors())
+            .map(|(motor, signal)| match &motor.drive {
+                Drive::Speed => signal.value(self.state.time),
+                Drive::Torque { dof } => Ok(self.state.velocity[*dof]),
             })
             .collect()
     }

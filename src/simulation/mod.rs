@@ -22,17 +22,22 @@ use crate::bdf::history::{History, Sample};
 use crate::contact::spillmann::ContactSolver;
 use crate::forces::outside::{ForceFunction, OutsideForce};
 use crate::inputs::Inputs;
+use crate::inputs::over_step::OverStep;
 use crate::model::contact::ContactModel;
 use crate::model::specification::Specification;
 use crate::model::{Model, ModelError};
-use crate::nonlinear::continuation::Continuation;
-use crate::nonlinear::newton::{self, Goal, NewtonSettings, NewtonWork};
+use crate::nonlinear::continuation;
+use crate::nonlinear::equations::Goal;
+use crate::nonlinear::newton::{self, NewtonSettings, NewtonWork};
 use crate::runtime::interrupt::Hook;
 use crate::runtime::threads::Threads;
+use crate::simulation::adaptive::LONGEST_STEP;
 use crate::simulation::failure::{StepError, TryError};
 use crate::simulation::progress::Progress;
 use crate::state::State;
+use crate::state::account::Account;
 use crate::step::budget::Accepted;
+use crate::step::equations::StepEquations;
 use crate::step::problem::{Balance, Drives, Step, Unknowns};
 use crate::step::scheme::Scheme;
 use crate::step::statistics::Statistics;
@@ -50,17 +55,18 @@ const INSTANT: f64 = 1e-3;
 const HALVINGS: u32 = 12;
 
 /// What motors, clamps, loads and a caller's function do over a step.
-type Prepared = (Inputs, Option<Arc<OutsideForce>>);
+type Prepared = (OverStep, Option<Arc<OutsideForce>>);
 
-/// A model, its state, and the workspace that takes it forward.
+/// A model, what drives it, its state, and the workspace that takes it forward.
 pub struct Simulation {
-    pub(crate) model: Model,
+    pub(crate) model: Arc<Model>,
+    pub(crate) inputs: Inputs,
     pub(crate) state: State,
     pub(crate) balance: Balance,
     pub(crate) scheme: Scheme,
     pub(crate) dt: f64,
     pub(crate) settings: NewtonSettings,
-    pub(crate) work: NewtonWork,
+    pub(crate) work: NewtonWork<Unknowns>,
     contact: Option<ContactSolver>,
     pub(crate) statistics: Statistics,
     fluid_step: Option<u64>,
@@ -81,16 +87,33 @@ impl Simulation {
     /// # Errors
     /// [`ModelError`] naming what is not valid.
     pub fn new(specification: Specification, scheme: Scheme, dt: f64, thread_count: usize) -> Result<Self, ModelError> {
-        let (model, state) = Model::new(specification)?;
-        if let Some(overlap) = model.overlap(&state) {
+        let model = Arc::new(Model::new(specification)?);
+        let state = State::initial(&model)?;
+        if let Some(overlap) = model.overlap(&state.positions(&model.network)) {
             return Err(ModelError::Overlap(overlap));
         }
+        let inputs = Inputs::of(&model);
+        Self::from_model(model, inputs, state, scheme, dt, thread_count)
+    }
+
+    /// A simulation of a model that others may share, from one of its states: nothing is analysed again.
+    ///
+    /// # Errors
+    /// As [`Self::adopt`].
+    pub fn from_model(
+        model: Arc<Model>,
+        inputs: Inputs,
+        mut state: State,
+        scheme: Scheme,
+        dt: f64,
+        thread_count: usize,
+    ) -> Result<Self, ModelError> {
         let balance = Balance::new(&model, Threads(thread_count))?;
         let contact = model.contact.as_ref().and_then(ContactModel::spillmann).map(ContactSolver::new);
-        let mut state = state;
-        state.density = balance.zero_density(scheme);
+        state.fit_density(balance.zero_density(scheme).len());
+        state.check(&model, state.density.len())?;
         let trial = Unknowns { q: state.q.clone(), density: state.density.clone(), tensions: state.tensions.clone() };
-        Ok(Self {
+        let mut simulation = Self {
             work: NewtonWork::new(&trial),
             trial,
             tolerance: None,
@@ -104,12 +127,31 @@ impl Simulation {
             statistics: Statistics::default(),
             fluid_step: None,
             model,
-            state,
+            inputs,
+            state: state.clone(),
             balance,
             scheme,
             dt,
             contact,
-        })
+        };
+        simulation.adopt(state)?;
+        Ok(simulation)
+    }
+
+    /// What drives the scene.
+    pub fn inputs(&self) -> &Inputs {
+        &self.inputs
+    }
+
+    /// Drives the scene by other inputs from here on; rates may jump, so that past states foretell nothing any more.
+    pub fn set_inputs(&mut self, inputs: Inputs) {
+        self.inputs = inputs;
+        self.begin_anew();
+    }
+
+    /// The constant part, to be shared.
+    pub fn shared_model(&self) -> Arc<Model> {
+        Arc::clone(&self.model)
     }
 
     /// The constant part.
@@ -169,12 +211,16 @@ impl Simulation {
     /// # Errors
     /// As [`State::check`]; [`ModelError::Shape`] if it is not a configuration; [`ModelError::Overlap`] if barrier contact
     /// cannot go on from there. The present state is then kept.
-    pub fn adopt(&mut self, state: State) -> Result<(), ModelError> {
-        state.check(&self.model, &self.state)?;
+    pub fn adopt(&mut self, mut state: State) -> Result<(), ModelError> {
+        let flow = self.state.density.len();
+        state.fit_density(flow);
+        state.check(&self.model, flow)?;
         if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
             return Err(ModelError::Shape { shape: "nodes" });
         }
-        if let Some(overlap) = self.model.overlap(&state).filter(|_| self.model.barrier().is_some()) {
+        if let Some(overlap) =
+            self.model.overlap(&state.positions(&self.model.network)).filter(|_| self.model.barrier().is_some())
+        {
             return Err(ModelError::Overlap(overlap));
         }
         self.restore(state);
@@ -202,7 +248,7 @@ impl Simulation {
         state.contact_anchor.clear();
         state.contacts.clear();
         state.control = Control::default();
-        state.account = crate::step::budget::Account::default();
+        state.account = Account::default();
         state.frames.follow_turned_over(network, nodes);
         self.adopt(state)
     }
@@ -291,7 +337,7 @@ impl Simulation {
         self.open_account();
         let prepared = self.prepare(&mut trial, t0, t1);
         let solved = prepared.and_then(|(inputs, outside)| {
-            let Inputs { angles, torques, loads, departure, impulses, load_impulses, .. } = inputs;
+            let OverStep { angles, torques, loads, departure, impulses, load_impulses, .. } = inputs;
             let drives = Drives { motor_angles: angles, motor_torques: torques, inputs: loads, ambient: None, outside };
             let drives = self.solve(drives, dt, order, &mut trial)?;
             Ok((drives, departure, impulses, load_impulses))
@@ -322,6 +368,7 @@ impl Simulation {
             let highest_order = if self.force.is_some() { 1 } else { self.scheme.highest_order() };
             let estimate = Estimate { missed: &missed, unseen, tolerance, highest_order };
             (self.state.control, accepted) = control.judge(&times, t1, &estimate);
+            self.state.control.dt = self.state.control.dt.min(LONGEST_STEP * self.dt);
         }
         if accepted {
             self.accept(drives, dt, order, &missed)?;
@@ -332,7 +379,7 @@ impl Simulation {
     /// Refuses a trial so far away that round-off of its coordinates is no longer small against its filament: unstable steps lead
     /// there.
     fn check_reach(&self) -> Result<(), TryError> {
-        let Model { network, error_weight, .. } = &self.model;
+        let Model { network, error_weight, .. } = &*self.model;
         let mut coordinates = network.node_dofs().iter().flat_map(|&dof| dof..dof + 3);
         match coordinates.find(|&dof| self.trial.q[dof].abs() * error_weight[dof] > FARTHEST) {
             None => Ok(()),
@@ -359,22 +406,35 @@ impl Simulation {
     /// What drives the step; the guess, with the prescribed degrees of freedom set.
     fn prepare(&mut self, guess: &mut Unknowns, t0: f64, t1: f64) -> Result<Prepared, TryError> {
         let outside = self.outside_force()?;
-        let inputs = Inputs::new(&self.model, &self.state.motor_angles, (t0, t1))?;
+        let over = OverStep::new(&self.model, &self.inputs, &self.state.motor_angles, (t0, t1))?;
         let state = &self.state;
         let order = state.history.guess_order();
         state.history.extrapolate(order, (t0, &state.q), |sample| &sample.q, t1, &mut guess.q);
         state.history.extrapolate(order, (t0, &state.density), |sample| &sample.density, t1, &mut guess.density);
         guess.tensions.copy_from_slice(&state.tensions);
-        for (clamp, turn) in self.model.clamps.iter().zip(&inputs.turns) {
-            clamp.advance((t0, &state.q), &state.frames, (t1, *turn), &mut guess.q)?;
+        let motions = self.inputs.clamps().iter().zip(&over.turns);
+        for (clamp, (motion, turn)) in self.model.clamps.iter().zip(motions) {
+            clamp.advance(motion, (t0, &state.q), &state.frames, (t1, *turn), &mut guess.q)?;
         }
-        Ok((inputs, outside))
+        Ok((over, outside))
     }
 
     /// Solves the step from the guess, contact included; what has driven it.
     fn solve(&mut self, mut drives: Drives, dt: f64, order: usize, trial: &mut Unknowns) -> Result<Drives, TryError> {
-        let Self { model, state, balance, scheme, settings, work, contact, statistics, positions, stiffness, .. } =
-            self;
+        let Self {
+            model,
+            inputs,
+            state,
+            balance,
+            scheme,
+            settings,
+            work,
+            contact,
+            statistics,
+            positions,
+            stiffness,
+            ..
+        } = self;
         let dofs = model.network.node_dofs();
         let place = |q: &[f64], positions: &mut [Vec3]| {
             positions.iter_mut().zip(dofs).for_each(|(x, &dof)| *x = crate::rod::configuration::node(q, dof));
@@ -393,10 +453,10 @@ impl Simulation {
             balance.place_fluid(positions, statistics)?;
             self.fluid_step = Some(state.steps);
         }
-        if order == 1 && !model.flows.is_empty() {
+        if order == 1 && !inputs.flows().is_empty() {
             place(&state.q, positions);
         }
-        drives.ambient = model.ambient(positions, state.time + dt)?;
+        drives.ambient = inputs.ambient(model.network.edges(), positions, state.time + dt)?;
         let step = Step::new(*scheme, state, dt, order, drives);
         balance.begin(model, &step, statistics)?;
         let failed = |failure: newton::NewtonFailure| TryError::Solve {
@@ -408,8 +468,8 @@ impl Simulation {
         let law = model.contact.as_ref().and_then(ContactModel::spillmann);
         let (Some(law), Some(contact)) = (law, contact) else {
             keep_apart(balance, model, &state.q, &mut trial.q, statistics)?;
-            let mut continuation = Continuation { balance, model, step: &step, settings, work, statistics };
-            continuation.solve(trial).map_err(failed)?;
+            let mut equations = StepEquations { model, step: &step, balance, statistics };
+            continuation::solve(&mut equations, settings, work, trial).map_err(failed)?;
             return Ok(step.into_drives());
         };
         contact.begin(&state.contacts);
@@ -418,7 +478,7 @@ impl Simulation {
         let mut violation = f64::INFINITY;
         let rough = match settings.goal {
             Goal::Residual(tolerance) => Goal::Residual(tolerance.max(ROUGH_TOLERANCE)),
-            goal @ Goal::Displacement(_) => goal,
+            goal @ Goal::Correction(_) => goal,
         };
         let rough = NewtonSettings { goal: rough, ..*settings };
         // While contact forces are being found, the balance between passes need not be solved to the last digit.
@@ -426,7 +486,8 @@ impl Simulation {
         for _ in 0..law.max_iterations() {
             balance.set_contact(|add| contact.spread(law, positions, add), dofs);
             let wanted = if settled { *settings } else { rough };
-            newton::solve(balance, model, &step, &wanted, work, trial, statistics).map_err(failed)?;
+            let mut equations = StepEquations { model, step: &step, balance, statistics };
+            newton::solve(&mut equations, &wanted, work, trial).map_err(failed)?;
             place(&trial.q, positions);
             let start = Instant::now();
             let loaded = !contact.forces().is_empty();

@@ -12,20 +12,22 @@ const FRAME_TOLERANCE: f64 = 1e-6;
 const MOST_STEPS: u64 = 1 << 62;
 
 impl State {
-    /// Checks that the state fits a model, of which `like` is a state: lengths, ranges, orders, finite values throughout.
+    /// Checks that the state fits a model and the length `flow` of force densities on the fluid: lengths, ranges, orders, finite values
+    /// throughout.
     ///
     /// # Errors
     /// [`ModelError::Length`] or [`ModelError::Value`] naming the first field that is wrong.
-    pub fn check(&self, model: &Model, like: &Self) -> Result<(), ModelError> {
-        let (dofs, flow) = (like.q.len(), like.density.len());
+    pub fn check(&self, model: &Model, flow: usize) -> Result<(), ModelError> {
+        let dofs = model.dof_count();
+        let (edges, hinges) = (model.network().edges().len(), model.network().hinges().len());
         finite("state.time", &[self.time])?;
         range("state.steps", self.steps as f64, self.steps <= MOST_STEPS, "at most 2^62")?;
         vector("state.q", &self.q, dofs)?;
         vector("state.velocity", &self.velocity, dofs)?;
         vector("state.density", &self.density, flow)?;
-        vector("state.tensions", &self.tensions, like.tensions.len())?;
-        vector("state.motor_angles", &self.motor_angles, like.motor_angles.len())?;
-        vector("state.twists", &self.frames.twists, like.frames.twists.len())?;
+        vector("state.tensions", &self.tensions, edges)?;
+        vector("state.motor_angles", &self.motor_angles, model.motors.len())?;
+        vector("state.twists", &self.frames.twists, hinges)?;
         let dt = self.control.dt;
         range("state.control_step", dt, dt.is_finite() && dt >= 0.0, "a finite time >= 0 s")?;
         let order = self.control.order;
@@ -33,7 +35,7 @@ impl State {
         let ceiling = self.control.ceiling;
         range("state.control_step", ceiling, ceiling > 0.0, "> 0 s")?;
         self.check_history(dofs, flow)?;
-        self.check_frames(like)?;
+        self.check_frames(edges)?;
         self.check_contacts(model)
     }
 
@@ -58,10 +60,10 @@ impl State {
         Ok(())
     }
 
-    fn check_frames(&self, like: &Self) -> Result<(), ModelError> {
+    fn check_frames(&self, edges: usize) -> Result<(), ModelError> {
         let (tangents, directors) = (&self.frames.tangents, &self.frames.directors);
-        length("state.tangents", tangents.len(), like.frames.tangents.len())?;
-        length("state.directors", directors.len(), like.frames.directors.len())?;
+        length("state.tangents", tangents.len(), edges)?;
+        length("state.directors", directors.len(), edges)?;
         for (tangent, director) in tangents.iter().zip(directors) {
             unit("state.tangents", tangent)?;
             unit("state.directors", director)?;

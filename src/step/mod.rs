@@ -2,14 +2,16 @@
 //!
 //! * [`scheme`]: which terms a time-stepping scheme keeps and how it treats the fluid.
 //! * [`problem`]: the force balance of a step: residual and derivative.
+//! * `equations`: the same as Newton's method sees it.
 //! * `saddle`: its linear systems, forces and flow.
 //! * `targets`: what a residual is measured by.
 //! * `contact`: contact in a step's equations.
-//! * [`budget`]: energies, balances and extremes of a run.
+//! * `budget`: what a step adds to energies, balances and extremes.
 //! * [`statistics`]: counts and times.
 
-pub mod budget;
+pub(crate) mod budget;
 pub(crate) mod contact;
+pub(crate) mod equations;
 pub mod problem;
 pub(crate) mod saddle;
 pub mod scheme;

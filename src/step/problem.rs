@@ -21,7 +21,7 @@ use crate::linear::LinearError;
 use crate::linear::krylov::Gmres;
 use crate::linear::nearly_symmetric::NearlySymmetric;
 use crate::model::Model;
-use crate::nonlinear::newton::Goal;
+use crate::nonlinear::equations::{Goal, Size};
 use crate::rod::assembly::{Assembly, Increment, Term};
 use crate::rod::configuration::{Configuration, ShaftAngle};
 use crate::runtime::interrupt::Interrupt;
@@ -30,7 +30,7 @@ use crate::state::State;
 use crate::step::contact::barrier::BarrierTerm;
 use crate::step::scheme::Scheme;
 use crate::step::statistics::Statistics;
-use crate::step::targets::{Size, Targets};
+use crate::step::targets::Targets;
 use crate::{Mat3, Vec3};
 
 /// GMRES iterations before the dense fallback; far above what a good preconditioner needs.
@@ -136,8 +136,6 @@ pub(crate) struct Balance {
     pub(crate) slip: Vec<f64>,
     elastic: Vec<f64>,
     pub(crate) jacobian: Vec<f64>,
-    masked: Vec<usize>,
-    diagonal: Vec<usize>,
     pub(crate) system: NearlySymmetric,
     /// Where the system stores the entries of the model's pattern; it may have more.
     pub(crate) embedding: Vec<u32>,
@@ -145,8 +143,6 @@ pub(crate) struct Balance {
     pub(crate) gmres: Gmres,
     pub(crate) fluid: Option<Box<dyn FluidModel>>,
     pub(crate) fluid_dofs: Vec<usize>,
-    fluid_slots: Vec<[usize; 9]>,
-    node_slots: Vec<[usize; 9]>,
     pub(crate) flow: Vec<f64>,
     pub(crate) work: crate::step::saddle::Work,
     pub(crate) targets: Targets,
@@ -166,60 +162,27 @@ pub(crate) struct Balance {
 impl Balance {
     pub fn new(model: &Model, threads: Threads) -> Result<Self, LinearError> {
         let n = model.dof_count;
-        let pattern = &model.pattern;
+        let storage = &model.storage;
         let fluid = model.fluid()?;
-        let fluid_dofs: Vec<usize> = fluid.as_ref().map_or_else(Vec::new, |fluid| {
-            fluid.immersed().iter().map(|&node| model.network.node_dofs()[node]).collect()
-        });
+        let flow = 3 * storage.fluid_dofs.len();
         // The Krylov method works on the fluid's equation where there is one, else on the force balance.
-        let size = if fluid.as_ref().is_some_and(|fluid| !fluid.is_local()) { 3 * fluid_dofs.len() } else { n };
-        let slot =
-            |row: usize, column: usize| pattern.slot(row, column).ok_or(LinearError::Singular { what: "sparse" });
-        let block_slots = |dofs: &[usize]| {
-            let of_node = |&dof: &usize| {
-                let mut slots = [0; 9];
-                for column in 0..3 {
-                    for row in 0..3 {
-                        slots[row + 3 * column] = slot(dof + row, dof + column)?;
-                    }
-                }
-                Ok(slots)
-            };
-            dofs.iter().map(of_node).collect::<Result<Vec<_>, LinearError>>()
-        };
-        let fluid_slots = block_slots(&fluid_dofs)?;
-        let node_slots = block_slots(model.network.node_dofs())?;
-        let mut masked = Vec::new();
-        for column in 0..n {
-            for k in pattern.column_starts()[column]..pattern.column_starts()[column + 1] {
-                let row = pattern.row_indices()[k];
-                if model.prescribed[row] || model.prescribed[column] {
-                    masked.push(k);
-                }
-            }
-        }
-        let diagonal =
-            (0..n).filter(|&dof| model.prescribed[dof]).map(|dof| slot(dof, dof)).collect::<Result<_, _>>()?;
+        let size = if fluid.as_ref().is_some_and(|fluid| !fluid.is_local()) { flow } else { n };
         Ok(Self {
             configuration: Configuration::new(&model.network, n),
             shafts: Vec::new(),
             residual: vec![0.0; n],
             elastic: vec![0.0; n],
-            jacobian: vec![0.0; pattern.entries()],
-            masked,
-            diagonal,
-            system: NearlySymmetric::new(pattern.clone())?,
-            embedding: (0..pattern.entries() as u32).collect(),
+            jacobian: vec![0.0; storage.pattern.entries()],
+            system: NearlySymmetric::of(Arc::clone(&storage.pattern), Arc::clone(&storage.analysis)),
+            embedding: (0..storage.pattern.entries() as u32).collect(),
             barrier: model.barrier().map(BarrierTerm::new),
             gmres: Gmres::new(size, KRYLOV_LIMIT.min(size)),
-            work: crate::step::saddle::Work::new(n, 3 * fluid_dofs.len()),
-            targets: Targets::new(model, fluid_dofs.len()),
-            slip: vec![0.0; 3 * fluid_dofs.len()],
-            flow: vec![0.0; 3 * fluid_dofs.len()],
+            work: crate::step::saddle::Work::new(n, flow),
+            targets: Targets::new(model, storage.fluid_dofs.len()),
+            slip: vec![0.0; flow],
+            flow: vec![0.0; flow],
             fluid,
-            fluid_dofs,
-            fluid_slots,
-            node_slots,
+            fluid_dofs: storage.fluid_dofs.clone(),
             constant: vec![0.0; n],
             contact: vec![0.0; n],
             reaction: vec![0.0; n],
@@ -407,7 +370,7 @@ impl Balance {
         }
         self.add_fluid(step, trial)?;
         for (motor, torque) in model.motors.iter().zip(&step.motor_torques) {
-            if let Drive::Torque { dof, .. } = motor.drive {
+            if let Drive::Torque { dof } = motor.drive {
                 self.residual[dof] -= torque;
             }
         }
@@ -460,27 +423,27 @@ impl Balance {
         }
         model.dissipative.iter().for_each(|term| term.add(&self.configuration, &increment, &mut out));
         if let Some(fluid) = self.fluid.as_deref().filter(|_| step.scheme.fluid_is_implicit()) {
-            for (slots, block) in self.fluid_slots.iter().zip(fluid.local()) {
+            for (slots, block) in model.storage.fluid_blocks.iter().zip(fluid.local()) {
                 for (&slot, entry) in slots.iter().zip(block.as_slice()) {
                     self.jacobian[slot] += entry * step.rate;
                 }
             }
         }
         if let Some(outside) = &step.outside {
-            for (slots, block) in self.node_slots.iter().zip(outside.stiffness()) {
+            for (slots, block) in model.storage.node_blocks.iter().zip(outside.stiffness()) {
                 for (&slot, entry) in slots.iter().zip(block.as_slice()) {
                     self.jacobian[slot] += entry;
                 }
             }
         }
-        self.masked.iter().for_each(|&slot| self.jacobian[slot] = 0.0);
-        self.diagonal.iter().for_each(|&slot| self.jacobian[slot] = 1.0);
+        model.storage.held.iter().for_each(|&slot| self.jacobian[slot] = 0.0);
+        model.storage.held_diagonal.iter().for_each(|&slot| self.jacobian[slot] = 1.0);
     }
 
     /// Elastic gradient and the values of the elastic Hessian at a state.
     pub fn elastic(&mut self, model: &Model, state: &State) -> (Vec<f64>, Vec<f64>) {
         let shafts = model.shafts(&state.motor_angles, &state.q);
-        let (mut gradient, mut hessian) = (vec![0.0; model.dof_count], vec![0.0; model.pattern.entries()]);
+        let (mut gradient, mut hessian) = (vec![0.0; model.dof_count], vec![0.0; model.storage.pattern.entries()]);
         if self.configuration.update(&model.network, &state.q, &state.frames, &shafts) {
             let increment = Increment {
                 rate: 0.0,

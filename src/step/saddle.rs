@@ -48,7 +48,7 @@ pub(crate) struct Work {
 
 /// What is still to be corrected of a trial solution.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Correction {
+pub(crate) struct Remainder {
     /// Largest displacement, relative to the size of its filament.
     pub length: f64,
     /// Changes of sliding velocities.
@@ -95,7 +95,7 @@ impl Balance {
         if let Some((_, barrier)) = contact.filter(|(_, barrier)| !barrier.is_bound()) {
             let node_dofs = model.network.node_dofs();
             let blocks = barrier.blocks(node_dofs);
-            let (pattern, embedding) = model.pattern.extended(blocks.iter().map(Vec::as_slice));
+            let (pattern, embedding) = model.storage.pattern.extended(blocks.iter().map(Vec::as_slice));
             barrier.bind(node_dofs, &pattern);
             self.system = NearlySymmetric::new(pattern)?;
             self.embedding = embedding;
@@ -108,22 +108,9 @@ impl Balance {
         Ok(barrier.is_symmetric(law))
     }
 
-    /// Newton direction for the last residual, from the given tensions of edges; `tolerance` is the relative residual of the
-    /// linear system.
-    pub fn direction(
-        &mut self,
-        model: &Model,
-        step: &Step,
-        tensions: &[f64],
-        tolerance: f64,
-        out: &mut Unknowns,
-        statistics: &mut Statistics,
-    ) -> Result<(), LinearError> {
-        let start = Instant::now();
-        let solved = self.solve(model, step, tolerance, out, statistics);
+    /// Makes the tensions of a direction those that its displacement, to first order, gives the edges beyond the given ones.
+    pub fn tension_changes(&self, model: &Model, tensions: &[f64], out: &mut Unknowns) {
         model.stretching.tension_changes(&self.configuration, &out.q, tensions, &mut out.tensions);
-        statistics.seconds_linear += start.elapsed().as_secs_f64();
-        solved
     }
 
     /// How the last residual would be corrected were the fluid's resistance local, with the factors of the last linearisation;
@@ -134,7 +121,7 @@ impl Balance {
         step: &Step,
         tolerance: f64,
         statistics: &mut Statistics,
-    ) -> Result<Correction, LinearError> {
+    ) -> Result<Remainder, LinearError> {
         let start = Instant::now();
         self.work.rhs.iter_mut().zip(&self.residual).for_each(|(rhs, residual)| *rhs = -residual);
         let Self { system, fluid, fluid_dofs, slip, work, .. } = self;
@@ -149,7 +136,7 @@ impl Balance {
         let length = relative.fold(0.0, f64::max);
         let slip = self.slip_change(model, step, tolerance);
         statistics.seconds_linear += start.elapsed().as_secs_f64();
-        solved.map(|()| Correction { length, slip })
+        solved.map(|()| Remainder { length, slip })
     }
 
     /// What the displacement at hand means for contacts with friction.
@@ -215,7 +202,7 @@ impl Balance {
 
     /// The same of a unit of a load's signal.
     pub fn response_to_load(&mut self, model: &Model, channel: usize) -> Result<f64, LinearError> {
-        let mut unit = model.inputs.zero();
+        let mut unit = vec![0.0; model.load_channels];
         let zero = vec![0.0; model.dof_count];
         self.work.rhs.fill(0.0);
         for value in [0.0, 1.0] {
@@ -240,7 +227,8 @@ impl Balance {
         Ok(moved.iter().zip(&model.error_weight).map(|(moved, weight)| moved.abs() * weight).fold(0.0, f64::max))
     }
 
-    fn solve(
+    /// Newton's direction for the last residual, but for its tensions; `tolerance` is the relative residual of the linear system.
+    pub fn solve(
         &mut self,
         model: &Model,
         step: &Step,

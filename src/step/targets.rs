@@ -4,24 +4,11 @@
 use crate::Mat3;
 use crate::fluid::FluidModel;
 use crate::model::Model;
-use crate::nonlinear::newton::Goal;
+use crate::nonlinear::equations::{Goal, Size};
 use crate::step::problem::Step;
 
 /// Least force a filament is measured by, in its bending stiffness over its length squared.
 const LEAST: f64 = 1e-8;
-
-/// Size of a residual.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Size {
-    /// Largest nodal force or, divided by the mean edge of its filament, moment, N; velocities count with the node's own drag.
-    pub norm: f64,
-    /// Largest entry over its own target: solved at 1.
-    pub excess: f64,
-    /// Root of the sum of squares, each weighted as [`Targets::weigh`] last did, for the line search.
-    pub merit: f64,
-    /// Degree of freedom with the largest entry over its target.
-    pub worst: usize,
-}
 
 /// Targets and weights of the residual's entries.
 pub(crate) struct Targets {
@@ -84,7 +71,7 @@ impl Targets {
         let least = LEAST * model.filaments.all()[filament].bending_force;
         match self.goal {
             Goal::Residual(tolerance) => (tolerance * self.force[filament].max(least)).max(self.floor[dof]),
-            Goal::Displacement(_) => self.floor[dof],
+            Goal::Correction(_) => self.floor[dof],
         }
     }
 
@@ -109,7 +96,8 @@ impl Targets {
         }
     }
 
-    /// Size of a residual and of that of the fluid's equation.
+    /// Size of a residual and of that of the fluid's equation: the norm is the largest nodal force or, divided by the mean edge of its
+    /// filament, moment, N; velocities count with the node's own drag. Entries are numbered by degrees of freedom.
     pub fn size(&self, model: &Model, residual: &[f64], slip: &[f64], fluid_dofs: &[usize]) -> Size {
         let mut size = Size { norm: 0.0, excess: 0.0, merit: 0.0, worst: 0 };
         let mut count = |force: f64, target: f64, dof: usize| {
@@ -148,7 +136,7 @@ impl Targets {
             let dof = fluid_dofs[k / 3] + k % 3;
             *weight = match self.goal {
                 Goal::Residual(_) => self.drag_per_slip[k / 3] / self.slip_target(model, dof),
-                Goal::Displacement(_) => {
+                Goal::Correction(_) => {
                     let filament = model.filaments.all()[model.filaments.of_dof()[dof]];
                     1.0 / if filament.held { smallest } else { filament.size }
                 }

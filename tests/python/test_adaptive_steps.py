@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flagrs import Fluid, Scene, SceneError, Simulation, Trajectory, rpm, scenarios
+from flagrs import Fluid, Material, Rod, Scene, SceneError, Simulation, Trajectory, rpm, scenarios
 from flagrs.time_step import size
 
 
@@ -140,3 +140,14 @@ def test_an_error_out_of_range_is_refused(rtol: float) -> None:
 def test_the_explicit_scheme_takes_no_error() -> None:
     with pytest.raises(SceneError, match="explicit"):
         Simulation(scenarios.robot(rpm=float(rpm(1.0))), scheme="explicit", rtol=1e-3)
+
+
+def test_steps_of_a_scene_at_rest_grow_to_a_bound() -> None:
+    rod = Rod.straight(
+        length=0.1, edge_count=4, radius=1e-3, material=Material(youngs_modulus=1e6, density=1e3)
+    )
+    simulation = Simulation(Scene(rods=rod, fluid=Fluid(viscosity=1.0, model="RFT")), rtol=1e-2, dt=1.0)
+    simulation.step(1200)
+    # A billion fixed steps each; without a bound they would double a thousand times.
+    assert 1e11 < simulation.time < 1.3e12
+    assert np.isfinite(simulation.state()["control_step"]).all()

@@ -12,6 +12,7 @@ from flagrs import Rod, SceneError, Simulation, fluid
 from flagrs.cli import app
 from flagrs.validation import PROBLEMS, Check, Outcome, Problem, chosen, solve, validate
 from flagrs.validation.problem import Evidence, converging, extrapolated, observed_order
+from flagrs.validation.problems import flutter, straining
 from flagrs.validation.problems.relaxation import wave_numbers
 from flagrs.validation.report import write_report
 from flagrs.validation.table import plain
@@ -75,6 +76,8 @@ def stiffer_twisting(factor: float) -> Any:
         "relaxation_in_time",
         "localized_buckling",
         "whirling",
+        "flutter",
+        "buckling_in_extension",
     ],
 )
 def test_a_bending_stiffness_off_by_half_a_per_cent_is_found(
@@ -82,6 +85,13 @@ def test_a_bending_stiffness_off_by_half_a_per_cent_is_found(
 ) -> None:
     monkeypatch.setattr(Rod, "EI_array", stiffer_bending(1.005))
     assert not solve(PROBLEMS[name]).passed
+
+
+def test_references_of_instabilities_are_the_published_numbers() -> None:
+    assert flutter.threshold("tip") == pytest.approx(37.6954, abs=5e-5)
+    assert flutter.linear_mode(37.6954, "tip")[0].imag == pytest.approx(191.26, abs=5e-3)
+    assert flutter.threshold("distributed") == pytest.approx(76.1021, abs=5e-5)
+    assert straining.threshold(0.5) == pytest.approx(153.202, abs=5e-4)
 
 
 @pytest.mark.parametrize("name", ["loaded_strip", "heavy_strip", "untwisting", "helical_spring"])

@@ -122,7 +122,7 @@ def test_the_head_as_a_sphere_stays_off_the_wall():
         fluid=Fluid(viscosity=1.0, density=0.0),
         head=Head(node=1, radius=1e-3),
         loads=flagrs.PointLoad(node=1, force=(0, 0, -1e-2)),
-        walls=Wall(),
+        walls=Wall(kind="contact"),
         contact=Contact(head_radius=20e-3),
     )
     simulation = Simulation(scene, rtol=1e-3)

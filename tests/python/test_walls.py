@@ -5,7 +5,7 @@ from __future__ import annotations
 import flagrs
 import numpy as np
 import pytest
-from flagrs import Contact, Fluid, Head, Material, Motor, Rod, Scene, SceneError, Simulation, Wall
+from flagrs import Contact, Fluid, Head, Material, Motor, Rod, Scene, SceneError, Simulation, Wall, plot
 from flagrs.validation import wall_reference
 
 SOFT = Material(youngs_modulus=1e6, poisson_ratio=0.5, density=1000.0)
@@ -178,7 +178,7 @@ def test_a_run_near_a_wall_goes_on_from_its_checkpoint_to_the_last_bit(tmp_path)
         ({"walls": Wall(point=(0, 0, 1.0))}, "rods[0].nodes"),
         ({"contact": Contact(method="spillmann-teschner")}, "contact.method"),
         ({"fluid": Fluid(viscosity=1.0, far_field_nodes=0)}, "fluid.far_field_nodes"),
-        ({"head": Head(node=5, radius=10e-3)}, "head.node"),
+        ({"head": Head(node=5, radius=10e-3)}, "head"),
         (
             {"fluid": Fluid(viscosity=1.0, background=flagrs.LinearFlow.uniform((1, 0, 0)))},
             "fluid.background[0]",
@@ -223,25 +223,20 @@ def test_a_rod_without_contact_that_reaches_the_wall_is_an_error_in_words():
         simulation.step(200)
 
 
-def test_the_head_is_slowed_as_its_own_image_says():
-    # Far from the wall, at C_t times its radius over the height of 0.1: 9/16 and 9/8 of that (Lorentz 1907).
-    rod = straight((-1e-3, 0, 0.1), (1e-3, 0, 0.1), 2, 1e-5)
-    head = Head(node=1, radius=10e-3)
-    for direction, factor in (((1, 0, 0), 9 / 16), ((0, 0, -1), 9 / 8)):
-        speeds = []
-        for walls in ((), (Wall(),)):
-            load = flagrs.PointLoad(node=1, force=1e-6 * np.array(direction))
-            scene = Scene(rods=rod, fluid=Fluid(viscosity=1.0), head=head, loads=load, walls=walls)
-            simulation = Simulation(scene, dt=1e-3)
-            simulation.step()
-            speeds.append(float(simulation.velocities[1] @ direction))
-        # The rod shares a hundredth of the drag.
-        assert speeds[1] / speeds[0] == pytest.approx(1 - factor * 0.1, rel=3e-3)
-
-
 def test_motors_near_a_wall_do_not_disturb_the_balance_of_forces():
-    scene = flagrs.scenarios.robot(C_t=1.2, contact=None).replace(walls=Wall(point=(0, 0, -0.1)))
+    robot = flagrs.scenarios.robot(contact=False)
+    scene = robot.replace(head=None, walls=Wall(point=(0, 0, -0.05)))
     assert isinstance(scene.motors[0], Motor)
     simulation = Simulation(scene, dt=1e-2)
     simulation.step(5)
     assert simulation.statistics["force_imbalance"] < 1e-6
+
+
+def test_a_run_near_a_wall_draws_its_flow_with_nothing_behind_the_wall():
+    rod = straight((0, 0, 3e-3), (20e-3, 0, 5e-3), 4)
+    scene = Scene(rods=rod, fluid=FLUID, gravity=(0, 0, -9.81), walls=Wall())
+    trajectory = Simulation(scene, dt=1e-3).run(until=2e-3, save_every=1e-3)
+    with pytest.raises(SceneError, match="from the wall"):
+        trajectory.flow([[0.0, 0.0, -1e-3]])
+    assert np.abs(trajectory.flow([[5e-3, 0.0, 0.0]])).max() < 1e-9 * np.abs(trajectory.flow(rod.nodes)).max()
+    plot.flow(trajectory, plane="xz", points=12)

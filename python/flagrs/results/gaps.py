@@ -25,12 +25,18 @@ class EdgeGaps:
         The scene; without contact, its edges are compared as with the default contact.
     reach
         Largest gap that is looked for [m]; farther edges have this one.
+    owner
+        Numbers (E,) of groups of edges: only edges of different ones are compared, and none of those below 0.
+        None: all colliding edges.
     """
 
-    def __init__(self, scene: Scene, reach: float) -> None:
+    def __init__(self, scene: Scene, reach: float, owner: IntArray | None = None) -> None:
         self._edges = edges_of(scene)
         self._radius = np.concatenate([rod.radius_array() for rod in scene.rods])
         self._colliding = np.concatenate([rod.colliding_array() for rod in scene.rods])
+        if owner is not None:
+            self._colliding = owner >= 0
+        self._owner = owner
         self.reach = reach
         rest = np.concatenate([rod.rest_lengths() for rod in scene.rods])
         given = None if scene.contact is None else scene.contact.exclusion_factor
@@ -59,6 +65,8 @@ class EdgeGaps:
         colliding = np.flatnonzero(self._colliding)
         near = cKDTree(ends[colliding].mean(axis=1)).query_pairs(limit, output_type="ndarray")
         pairs: IntArray = colliding[near]
+        if self._owner is not None:
+            pairs = pairs[self._owner[pairs[:, 0]] != self._owner[pairs[:, 1]]]
         free: IntArray = pairs[~self._excluded(pairs)]
         return free
 

@@ -77,7 +77,13 @@ def twists(scene: Scene, nodes: FloatArray, directors: FloatArray) -> FloatArray
     first, second = tangents[:, 0], tangents[:, 1] * flips
     carried = transported(directors[hinges[:, 0]], first, second)
     own = directors[hinges[:, 1]]
-    return angles_about(second, carried, own)
+    angle = angles_about(second, carried, own)
+    # Where the first edge points away from the second, both tangents do, and the way leads against them.
+    edges = edges_of(scene)
+    end, other = edges[hinges[:, 0], 1], edges[hinges[:, 1]]
+    ahead = (end == other[:, 0]) | (end == other[:, 1])
+    twist: FloatArray = np.where(ahead, angle, -angle)
+    return twist
 
 
 def _tangents_through(scene: Scene, nodes: Any) -> tuple[FloatArray, FloatArray]:

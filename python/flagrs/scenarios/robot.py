@@ -9,7 +9,7 @@ import numpy as np
 from flagrs.errors import not_allowed
 from flagrs.scenarios.overrides import ContactOverride, FluidOverride, contact_from, fluid_from
 from flagrs.scenarios.registry import scenario
-from flagrs.scene import Fluid, Head, Material, Motor, Rod, Scene, Wall
+from flagrs.scene import Fluid, Head, Material, Motor, Rod, Scene
 from flagrs.scene.shapes import Helix, edge_count, helix_nodes, number
 from flagrs.scene.values import Bounds, FloatArray
 from flagrs.units import rpm as revolutions_per_minute
@@ -38,7 +38,6 @@ def robot(
     C_t: float = 4.1,
     C_r: float = 0.9,
     scale: float = 1.0,
-    wall: float | None = None,
 ) -> Scene:
     """Return the swimming robot of Lim et al.: two flagella, two motors, one head.
 
@@ -68,10 +67,6 @@ def robot(
         Prefactors of the head's drag, translational and rotational [1].
     scale
         Factor on all lengths of the robot, `edge_length` among them [1].
-    wall
-        Distance of a no-slip wall from the robot's middle [m], along the flagella and level with both: at
-        ``z = -wall``. None: unbounded fluid, as in the text. The drag of the head is known at distances above
-        ``2.25 C_t`` times its radius of 31 mm.
 
     Returns
     -------
@@ -109,14 +104,9 @@ def robot(
             Motor(node=last + 2, shaft=last + 1, speed=speeds[0]),
             Motor(node=last + 6, shaft=last + 6, speed=speeds[1]),
         ),
-        walls=() if wall is None else (_floor(wall),),
         contact=contact_from(contact),
         name="robot",
     )
-
-
-def _floor(distance: float) -> Wall:
-    return Wall(point=(0.0, 0.0, -number("wall", distance, Bounds("m", above=0.0))))
 
 
 def _nodes(pitch: float, edge_length: float) -> tuple[FloatArray, int]:

@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 #: Immersed nodes up to which a wall may be in the flow: there, products are always made with the matrix.
 LARGEST_NEAR_WALL = 2000
 
-#: Height of the head over C_t times its radius below which its drag is not known: where the image of its
-#: force takes half of its own mobility (docs/theory/walls.md).
-LEAST_HEAD_HEIGHT = {"no_slip": 2.25, "free_surface": 1.5}
-
 #: Speed on a wall, over that at the distance of the rods, that counts as none.
 AT_REST = 1e-9
 
@@ -113,11 +109,12 @@ def _head(scene: Scene) -> Iterator[SceneError]:
     if head is None:
         return
     at = scene.rods[head.rod].nodes[[head.node]]
-    if wall is not None and scene.fluid is not None:
-        height, least = float(wall.heights(at)[0]), LEAST_HEAD_HEIGHT[wall.kind] * head.C_t * head.radius
-        if not height > least:
-            allowed = f"more than {least:.4g} m from it: nearer, the drag of a head of this C_t is not known"
-            yield faulty("head.node", f"{height:.4g} m from the wall", allowed)
+    if wall is not None and scene.fluid is not None and head.C_t > 0.0:
+        allowed = (
+            "None, or with C_t = 0, in a scene with a wall in the flow: a point head stirs no flow, so its "
+            "force would lack an image; Wall(kind='contact') is not in the flow"
+        )
+        yield faulty("head", "a point head near a wall", allowed)
     if scene.contact is not None and scene.contact.head_radius is not None:
         least = scene.contact.head_radius * (1.0 - scene.contact.tolerance_or_default())
         for position, near in enumerate(scene.walls):

@@ -10,6 +10,8 @@ pub mod function;
 pub mod linear;
 pub mod poiseuille;
 
+use std::sync::Arc;
+
 use crate::Vec3;
 use crate::rod::assembly::Background;
 use crate::signal::SignalError;
@@ -49,7 +51,7 @@ impl Ambient {
     /// As [`AmbientFlow::add`].
     pub fn update(
         &mut self,
-        flows: &[Box<dyn AmbientFlow>],
+        flows: &[Arc<dyn AmbientFlow>],
         nodes: &[Vec3],
         edges: &[[usize; 2]],
         time: f64,

@@ -1,6 +1,5 @@
 //! Instants at which what drives a scene has a corner or a jump: adaptive steps end there, and begin anew.
 
-use crate::forces::motors::{Drive, Motor};
 use crate::signal::Signal;
 
 /// Most corners within a step that are stepped to one by one; where there are more, a table samples a smooth function
@@ -45,12 +44,8 @@ impl Break {
 pub(crate) struct Breaks(Vec<Break>);
 
 impl Breaks {
-    /// Those of motors, of turning clamps, and of other signals: of loads and of clamps that move.
-    pub fn new<'a>(
-        motors: &[Motor],
-        turns: impl Iterator<Item = &'a Signal>,
-        others: impl Iterator<Item = &'a Signal>,
-    ) -> Self {
+    /// Those of angular velocities that are prescribed, and of other signals: torques, loads, and clamps that move.
+    pub fn new<'a>(speeds: impl Iterator<Item = &'a Signal>, others: impl Iterator<Item = &'a Signal>) -> Self {
         let speed = |(time, jump): (f64, f64)| {
             let kind = if jump.is_finite() { Kind::Speed(jump) } else { Kind::Given };
             Break { time, kind }
@@ -63,13 +58,7 @@ impl Breaks {
             });
             corners.collect::<Vec<_>>()
         };
-        let mut all: Vec<Break> = turns.flat_map(|signal| signal.corners().into_iter().map(speed)).collect();
-        for motor in motors {
-            match &motor.drive {
-                Drive::Speed(signal) => all.extend(signal.corners().into_iter().map(speed)),
-                Drive::Torque { signal, .. } => all.extend(relative(signal)),
-            }
-        }
+        let mut all: Vec<Break> = speeds.flat_map(|signal| signal.corners().into_iter().map(speed)).collect();
         all.extend(others.flat_map(relative));
         all.sort_by(|a, b| a.time.total_cmp(&b.time));
         Self(all)
@@ -107,7 +96,7 @@ mod tests {
     use super::*;
 
     fn of(times: Vec<f64>, values: Vec<f64>) -> Breaks {
-        Breaks::new(&[], std::iter::once(&Signal::Table { times, values }), std::iter::empty())
+        Breaks::new(std::iter::once(&Signal::Table { times, values }), std::iter::empty())
     }
 
     #[test]
@@ -145,7 +134,7 @@ mod tests {
     #[test]
     fn what_the_user_says_is_a_break_at_any_tolerance() {
         let function = crate::signal::Function { value: std::sync::Arc::new(Ok), breaks: vec![1.0], resolution: 1.0 };
-        let breaks = Breaks::new(&[], std::iter::once(&Signal::Function(function)), std::iter::empty());
+        let breaks = Breaks::new(std::iter::once(&Signal::Function(function)), std::iter::empty());
         assert_eq!(breaks.next(0.0, 2.0, 1e9), Some(1.0));
         assert!(breaks.at(1.0, 1e-9, 1e9));
     }

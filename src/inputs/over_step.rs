@@ -1,7 +1,7 @@
-//! What motors and clamps do over a step.
+//! What motors, clamps and loads do over a step.
 
 use crate::forces::motors::Drive;
-use crate::kinematics::clamp::Clamp;
+use crate::inputs::Inputs;
 use crate::model::Model;
 use crate::signal::quadrature::Course;
 use crate::signal::{Signal, SignalError};
@@ -11,7 +11,7 @@ const AT_THE_END: f64 = 1e-6;
 
 /// Angles, turns and torques at the end of a step, and what of them the ends of the step do not show.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Inputs {
+pub(crate) struct OverStep {
     /// Angle of every motor, rad; entries of torque-driven ones are not read.
     pub angles: Vec<f64>,
     /// Torque of every torque-driven motor, N m; zero for the others.
@@ -32,16 +32,12 @@ pub(crate) struct Inputs {
 ///
 /// # Errors
 /// What a user's function fails with.
-pub(crate) fn first_jump(model: &Model, (t0, t1): (f64, f64)) -> Result<Option<f64>, SignalError> {
-    let motors = model.motors.iter().map(|motor| match &motor.drive {
-        Drive::Speed(signal) | Drive::Torque { signal, .. } => signal,
-    });
-    let clamps = model.clamps.iter().flat_map(Clamp::signals);
+pub(crate) fn first_jump(model: &Model, inputs: &Inputs, (t0, t1): (f64, f64)) -> Result<Option<f64>, SignalError> {
+    let clamps = inputs.clamps().iter().zip(&model.clamps).flat_map(|(motion, clamp)| clamp.signals(motion));
+    let signals = inputs.motors().iter().chain(clamps).chain(inputs.loads());
     let apart = AT_THE_END * (t1 - t0);
     let mut first: Option<f64> = None;
-    for signal in
-        motors.chain(clamps).chain(model.inputs.signals()).filter(|signal| matches!(signal, Signal::Function(_)))
-    {
+    for signal in signals.filter(|signal| matches!(signal, Signal::Function(_))) {
         let jump = signal.course(t0, t1)?.jump.filter(|&jump| jump > t0 + apart && jump < t1 - apart);
         first = match (first, jump) {
             (Some(first), Some(jump)) => Some(first.min(jump)),
@@ -51,42 +47,42 @@ pub(crate) fn first_jump(model: &Model, (t0, t1): (f64, f64)) -> Result<Option<f
     Ok(first)
 }
 
-impl Inputs {
+impl OverStep {
     /// Those of a step from `t0`, where the motors stand at the given angles, to `t1`.
     ///
     /// # Errors
     /// What a user's function fails with.
-    pub fn new(model: &Model, angles: &[f64], (t0, t1): (f64, f64)) -> Result<Self, SignalError> {
-        let mut inputs = Self { angles: angles.to_vec(), torques: vec![0.0; angles.len()], ..Self::default() };
+    pub fn new(model: &Model, inputs: &Inputs, angles: &[f64], (t0, t1): (f64, f64)) -> Result<Self, SignalError> {
+        let mut over = Self { angles: angles.to_vec(), torques: vec![0.0; angles.len()], ..Self::default() };
         let unseen = |course: &Course| course.departure + course.uncertainty;
-        for (k, motor) in model.motors.iter().enumerate() {
+        for (k, (motor, signal)) in model.motors.iter().zip(inputs.motors()).enumerate() {
             match &motor.drive {
-                Drive::Speed(signal) => {
+                Drive::Speed => {
                     let course = signal.course(t0, t1)?;
-                    inputs.angles[k] += course.integral;
-                    inputs.departure = inputs.departure.max(unseen(&course));
+                    over.angles[k] += course.integral;
+                    over.departure = over.departure.max(unseen(&course));
                 }
-                Drive::Torque { signal, dof } => {
-                    inputs.torques[k] = signal.ends(t0, t1)?[1];
+                Drive::Torque { dof } => {
+                    over.torques[k] = signal.ends(t0, t1)?[1];
                     let impulse = unseen(&signal.course(t0, t1)?);
                     if impulse > 0.0 {
-                        inputs.impulses.push((*dof, impulse));
+                        over.impulses.push((*dof, impulse));
                     }
                 }
             }
         }
-        for clamp in &model.clamps {
-            let course = if clamp.edges.is_empty() { Course::default() } else { clamp.motion.spin.course(t0, t1)? };
-            inputs.turns.push(course.integral);
-            inputs.departure = inputs.departure.max(unseen(&course));
+        for (clamp, motion) in model.clamps.iter().zip(inputs.clamps()) {
+            let course = if clamp.edges.is_empty() { Course::default() } else { motion.spin.course(t0, t1)? };
+            over.turns.push(course.integral);
+            over.departure = over.departure.max(unseen(&course));
         }
-        inputs.loads = model.inputs.values(t1)?;
-        for (channel, signal) in model.inputs.signals().enumerate() {
+        over.loads = inputs.load_values(t1)?;
+        for (channel, signal) in inputs.loads().iter().enumerate() {
             let impulse = unseen(&signal.course(t0, t1)?);
             if impulse > 0.0 {
-                inputs.load_impulses.push((channel, impulse));
+                over.load_impulses.push((channel, impulse));
             }
         }
-        Ok(inputs)
+        Ok(over)
     }
 }
