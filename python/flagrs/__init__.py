@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         Sphere,
         Table,
         TimeFunction,
+        Wall,
     )
     from flagrs.simulation import Simulation
     from flagrs.suggestion import Suggestion, suggest
@@ -99,6 +100,7 @@ _PLACES = {
         "Sphere",
         "Table",
         "TimeFunction",
+        "Wall",
     ),
     "flagrs.simulation": ("Simulation",),
     "flagrs.suggestion": (
@@ -148,6 +150,7 @@ __all__ = [
     "Table",
     "TimeFunction",
     "Trajectory",
+    "Wall",
     "__version__",
     "contact",
     "fluid",

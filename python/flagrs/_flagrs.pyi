@@ -13,6 +13,7 @@ __all__ = [
     "Simulation",
     "__version__",
     "hat_weights",
+    "image_velocity",
     "mobility",
     "segment_distance",
     "thread_count",
@@ -99,7 +100,21 @@ class Simulation:
     def state(self) -> dict[str, npt.NDArray[Any]]: ...
     def load_state(self, saved: Mapping[str, npt.NDArray[Any]]) -> None: ...
 
-def mobility(nodes: _Floats, edges: _Ints, epsilon: _Floats, targets: _Floats, threads: int) -> _Floats: ...
+def mobility(
+    nodes: _Floats,
+    edges: _Ints,
+    epsilon: _Floats,
+    targets: _Floats,
+    wall: Mapping[str, Any] | None,
+    threads: int,
+) -> _Floats: ...
+def image_velocity(
+    at: _Floats,
+    segments: tuple[_Floats, _Ints, _Floats],
+    density: _Floats,
+    wall: Mapping[str, Any],
+    threads: int,
+) -> _Floats: ...
 def velocity(
     at: _Floats,
     nodes: _Floats,

@@ -6,7 +6,7 @@
 //! * [`loads`]: loads, magnetism and background flows from mappings.
 //! * [`body`]: the surface of a rigid body.
 //! * [`far_field`]: the product with the mobility without its matrix.
-//! * [`numerics`]: mobility, velocity and distances on plain arrays.
+//! * [`numerics`]: mobility, velocity and distances on plain arrays; [`walls`]: walls from mappings.
 //! * [`errors`]: errors of the core as Python exceptions.
 //! * [`arrays`]: positions and indices in and out of NumPy.
 
@@ -19,6 +19,7 @@ mod loads;
 mod numerics;
 mod simulation;
 mod specification;
+mod walls;
 
 use pyo3::prelude::*;
 
@@ -31,6 +32,7 @@ fn _flagrs(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<body::BodySurface>()?;
     module.add_function(wrap_pyfunction!(numerics::mobility, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::velocity, module)?)?;
+    module.add_function(wrap_pyfunction!(numerics::image_velocity, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::hat_weights, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::segment_distance, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::thread_count, module)?)?;

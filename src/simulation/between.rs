@@ -45,7 +45,7 @@ impl Simulation {
         Ok(state)
     }
 
-    pub(crate) fn interpolated(&self, time: f64) -> Result<State, StepError> {
+    pub(super) fn interpolated(&self, time: f64) -> Result<State, StepError> {
         let mut state = self.state.clone();
         let (past, now) = (&self.state.history, self.state.time);
         let order = past.past.len().min(state.control.order + 1);
