@@ -143,7 +143,8 @@ for arms in (3, 5, 8, 16):
                 f"a star of {arms} arms falls in {model}, {words}",
                 partial(star_falls, arms, model, options),
                 against="its own symmetry",
-                tolerance=1e-6,
+                # What adaptive steps leave to Newton's method, 0.02 rtol of the size, need not be symmetric.
+                tolerance=2e-6 if "rtol" in options else 1e-6,
             )
 
 
