@@ -23,7 +23,7 @@
 //!   one step; [`simulation`], step after step.
 //! * Imports run one way: `linear, nonlinear, bdf, signal, runtime <- rod, kinematics <- elastic, forces, fluid, contact <- model <- state, inputs <-
 //!   step <- simulation <- python`.
-//! * [`simulation::Simulation`] is the way in.
+//! * [`simulation::Simulation`] is the way in; [`rollout`] takes many states of one model side by side.
 
 pub mod bdf;
 pub mod contact;
@@ -38,6 +38,7 @@ pub mod nonlinear;
 #[cfg(feature = "python")]
 mod python;
 pub mod rod;
+pub mod rollout;
 pub mod runtime;
 pub mod signal;
 pub mod simulation;

@@ -13,6 +13,8 @@ from flagrs.guards import (
     StepWarning,
     StrainWarning,
 )
+from flagrs.reactions import Reaction
+from flagrs.rollout import Rollout, rollout
 from flagrs.scene import (
     Clamp,
     Contact,
@@ -60,8 +62,10 @@ __all__ = [
     "Motor",
     "PointLoad",
     "PoiseuilleFlow",
+    "Reaction",
     "ReynoldsWarning",
     "Rod",
+    "Rollout",
     "Rotation",
     "Scene",
     "SceneError",
@@ -77,6 +81,7 @@ __all__ = [
     "__version__",
     "contact",
     "fluid",
+    "rollout",
     "rpm",
     "scenarios",
     "suggest",

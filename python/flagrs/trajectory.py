@@ -13,7 +13,7 @@ import numpy as np
 
 from flagrs import trajectory_file
 from flagrs.assemble import edges_of
-from flagrs.budget import EnergyBudget, budget_of
+from flagrs.budget import EnergyBudget, budget_of, powers_of
 from flagrs.errors import FileError, FlagrsError
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.fluid import hat_weights
@@ -21,6 +21,7 @@ from flagrs.force_density import ForceDensity
 from flagrs.frame import shapes_of
 from flagrs.guards import Notice, StationarityWarning, notices
 from flagrs.measures import along, angle_about, slope, spin_about, window
+from flagrs.reactions import Reaction, reaction_of
 from flagrs.results.bundle import Bundle, bundle_of
 from flagrs.results.material_frames import directors
 from flagrs.results.readouts import ReadOuts, readouts_of
@@ -52,6 +53,9 @@ class Trajectory:
         Force on the fluid per length (T, N, 3) [N/m]; zero where the fluid does not act.
     motor_angle, motor_speed, motor_torque : ndarray
         Angles [rad], speeds [rad/s] and torques [N m] of the shafts (T, M).
+    clamp_force, clamp_torque, clamp_power : ndarray
+        Forces (T, C, 3) [N], torques about their first nodes (T, C, 3) [N m] and powers (T, C) [W] of the C
+        clamps; see `reaction`.
     contacts : ndarray
         Number of touching pairs of edges (T,).
     account : ndarray
@@ -81,6 +85,9 @@ class Trajectory:
         self.motor_angle = frames["motor_angle"]
         self.motor_speed = frames["motor_speed"]
         self.motor_torque = frames["motor_torque"]
+        self.clamp_force = frames["clamp_force"]
+        self.clamp_torque = frames["clamp_torque"]
+        self.clamp_power = frames["clamp_power"]
         self.contacts = frames["contacts"].astype(np.int64)
         self.energy = frames["energy"]
         self.account = frames["account"]
@@ -242,6 +249,29 @@ class Trajectory:
         """Return the power (T,) of all motors together, torque times speed [W]."""
         total: FloatArray = (self.motor_torque * self.motor_speed).sum(axis=1)
         return total
+
+    def reaction(self, clamp: int = 0) -> Reaction:
+        """Return force (T, 3), torque (T, 3) and power (T,) of a clamp on its filament [N, N m, W].
+
+        The torque is about the clamp's first node. A clamp that holds a swimmer, turned by it or by motors,
+        feels the opposite: its thrust.
+
+        Raises
+        ------
+        SceneError
+            If there is no such clamp.
+        FlagrsError
+            If the file was written before reactions were recorded.
+        """
+        return reaction_of(clamp, self.clamp_force, self.clamp_torque, self.clamp_power)
+
+    def powers(self) -> dict[str, FloatArray]:
+        """Return the power (T,) through every channel of the energy budget, given or taken [W].
+
+        ``motors``, ``clamps``, ``loads`` and ``gravity`` give; ``fluid``, ``twist_drag``, ``head``,
+        ``contact`` and ``other`` take. A frame between adaptive steps has those of the step's end.
+        """
+        return powers_of(self.account)
 
     def mean_power(self, start: float | None = None, end: float | None = None) -> float:
         """Return the mean power of all motors together in a window, by default the last half of the run [W].

@@ -103,6 +103,11 @@ impl Simulation {
         if self.correct(&step, &mut found, goal).is_some() {
             let rates = state.velocity.iter_mut().zip(found.q.iter().zip(&base.q));
             rates.for_each(|(velocity, (new, old))| *velocity += step.rate * (new - old));
+            if !self.model.clamps.is_empty()
+                && self.balance.evaluate(&self.model, &step, &found, &mut Statistics::default()).is_some()
+            {
+                state.reactions = self.balance.reactions(&self.model, &found.q, &state.velocity);
+            }
             (state.q, state.density, state.tensions) = (found.q, found.density, found.tensions);
             self.balance.configuration.accept(&mut state.frames);
         }
@@ -115,6 +120,8 @@ impl Simulation {
         if balance.fluid_mut().is_some_and(|fluid| fluid.is_local()) {
             balance.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
         }
+        // What else has moved the fluid since the step, such as a read-out or a restart, must not show.
+        balance.return_fluid(&step.state.fluid_nodes, &mut uncounted).ok()?;
         balance.begin(model, step, &mut uncounted).ok()?;
         let (mut direction, mut left) = (found.clone(), f64::INFINITY);
         for _ in 0..MOST_CORRECTIONS {

@@ -1,7 +1,7 @@
 //! A simulation: steps a model's state, retries with smaller steps, and keeps the last good state.
 //!
 //! * `adaptive`: steps of adaptive size and order; `between`, `output`: states between them.
-//! * `diagnostics`: motor torques, force densities, gaps.
+//! * [`frame`]: what is told of an instant; `diagnostics`: motor torques, force densities, gaps.
 //! * `outside`: forces that a caller's function gives; `progress`: whether work still moves the time on.
 //! * [`failure`]: what can go wrong with a step.
 
@@ -9,6 +9,7 @@ mod adaptive;
 mod between;
 mod diagnostics;
 pub mod failure;
+pub mod frame;
 mod output;
 mod outside;
 pub(crate) mod progress;
@@ -146,7 +147,12 @@ impl Simulation {
     /// Drives the scene by other inputs from here on; rates may jump, so that past states foretell nothing any more.
     pub fn set_inputs(&mut self, inputs: Inputs) {
         self.inputs = inputs;
-        self.begin_anew();
+        self.state.control.at_jump = true;
+    }
+
+    /// Local error of adaptive steps; none for fixed steps.
+    pub fn tolerance(&self) -> Option<f64> {
+        self.tolerance
     }
 
     /// The constant part, to be shared.
@@ -246,6 +252,7 @@ impl Simulation {
         state.density.fill(0.0);
         state.tensions.fill(0.0);
         state.contact_anchor.clear();
+        state.fluid_nodes.clear();
         state.contacts.clear();
         state.control = Control::default();
         state.account = Account::default();
@@ -533,6 +540,7 @@ impl Simulation {
             order,
             shortest_lasting: INSTANT * self.dt,
         });
+        let reactions = self.balance.reactions(&self.model, &self.trial.q, &velocity);
         let angles = step.into_drives().motor_angles;
         if !account.is_finite() {
             return Err(TryError::Solve {
@@ -544,6 +552,8 @@ impl Simulation {
         }
         let state = &mut self.state;
         state.account = account;
+        state.reactions = reactions;
+        self.balance.keep_fluid_nodes(&mut state.fluid_nodes);
         let replaced = Sample {
             time: state.time,
             q: std::mem::replace(&mut state.q, self.trial.q.clone()),

@@ -7,12 +7,14 @@
 //! * `targets`: what a residual is measured by.
 //! * `contact`: contact in a step's equations.
 //! * `budget`: what a step adds to energies, balances and extremes.
+//! * `reactions`: what clamps exert.
 //! * [`statistics`]: counts and times.
 
 pub(crate) mod budget;
 pub(crate) mod contact;
 pub(crate) mod equations;
 pub mod problem;
+pub(crate) mod reactions;
 pub(crate) mod saddle;
 pub mod scheme;
 pub mod statistics;

@@ -142,6 +142,8 @@ pub(crate) struct Balance {
     pub(crate) barrier: Option<BarrierTerm>,
     pub(crate) gmres: Gmres,
     pub(crate) fluid: Option<Box<dyn FluidModel>>,
+    /// Positions of the nodes, m, at which the fluid's geometry is.
+    placed: Vec<Vec3>,
     pub(crate) fluid_dofs: Vec<usize>,
     pub(crate) flow: Vec<f64>,
     pub(crate) work: crate::step::saddle::Work,
@@ -182,6 +184,7 @@ impl Balance {
             slip: vec![0.0; flow],
             flow: vec![0.0; flow],
             fluid,
+            placed: Vec::new(),
             fluid_dofs: storage.fluid_dofs.clone(),
             constant: vec![0.0; n],
             contact: vec![0.0; n],
@@ -222,8 +225,29 @@ impl Balance {
             Some(fluid) => fluid.update(positions, self.threads.pool().as_deref()),
             None => Ok(()),
         };
+        self.placed.clear();
+        if done.is_ok() {
+            self.placed.extend_from_slice(positions);
+        }
         statistics.seconds_fluid += start.elapsed().as_secs_f64();
         done
+    }
+
+    /// Moves a nonlocal fluid to where it was in a step, unless it stands there.
+    pub fn return_fluid(&mut self, positions: &[Vec3], statistics: &mut Statistics) -> Result<(), LinearError> {
+        let nonlocal = self.fluid.as_ref().is_some_and(|fluid| !fluid.is_local());
+        if nonlocal && !positions.is_empty() && self.placed != positions {
+            return self.place_fluid(positions, statistics);
+        }
+        Ok(())
+    }
+
+    /// Writes down where a nonlocal fluid stands.
+    pub fn keep_fluid_nodes(&self, out: &mut Vec<Vec3>) {
+        out.clear();
+        if self.fluid.as_ref().is_some_and(|fluid| !fluid.is_local()) {
+            out.extend_from_slice(&self.placed);
+        }
     }
 
     /// Prepares a step: the fluid's force, if it is that of the last velocities, and what contact takes from its beginning.
