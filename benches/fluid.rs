@@ -16,7 +16,7 @@ fn assembly(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("RSS assembly");
     for nodes in [59, 136, 600] {
         let scene = scenes::helix(nodes);
-        let epsilon = vec![scenes::ROBOT_EPSILON; scene.edges.len()];
+        let epsilon = scenes::epsilon(&scene);
         let mut out = vec![0.0; 9 * nodes * nodes];
         group.throughput(Throughput::Elements((nodes * scene.edges.len()) as u64));
         for &count in &counts {

@@ -12,7 +12,7 @@ use flagrs::linear::dense::DenseLu;
 
 fn mobility_of_helix(nodes: usize) -> Vec<f64> {
     let scene = scenes::helix(nodes);
-    let epsilon = vec![scenes::ROBOT_EPSILON; scene.edges.len()];
+    let epsilon = scenes::epsilon(&scene);
     let mut matrix = vec![0.0; 9 * nodes * nodes];
     mobility(&scene.nodes, &scene.nodes, &scene.edges, &epsilon, &mut matrix, None);
     matrix

@@ -106,11 +106,12 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    for (name, specification, dt, approach) in [
-        ("robot", scenes::robot(7.0, 20.0), scenes::robot_step(20.0), APART),
-        ("two clamped flagella, apart", scenes::clamped_flagella(2), scenes::clamped_step(), APART),
-        ("two clamped flagella, in contact", scenes::clamped_flagella(2), scenes::clamped_step(), BUNDLED),
+    for (name, scene, approach) in [
+        ("robot", "robot", APART),
+        ("two clamped flagella, apart", "two_clamped_flagella", APART),
+        ("two clamped flagella, in contact", "two_clamped_flagella", BUNDLED),
     ] {
+        let scenes::Canonical { specification, dt } = scenes::read(scene);
         let mut start = Simulation::new(specification.clone(), Scheme::Overdamped, dt, 1).expect("a valid scene");
         make_steps(&mut start, (approach / dt) as usize);
         let schemes =

@@ -18,14 +18,16 @@
 //! * Know nothing of rods: [`linear`], matrices; [`nonlinear`], Newton's method; [`bdf`], backward differences; [`signal`], functions of
 //!   time; [`runtime`], threads and Ctrl-C.
 //! * What acts on a filament: [`rod`], networks, frames, strains; [`kinematics`], clamps; [`elastic`], energies; [`forces`], motors, loads and
-//!   fields; [`fluid`], drag models and the head; [`contact`], distances and contact forces.
+//!   fields; [`fluid`], drag models and the head; [`contact`], distances and contact forces;
+//!   [`body`], rigid bodies in the flow.
 //! * What moves it: [`model`], the constant part of a scene; [`state`], the changing one; [`inputs`], what drives; [`step`], the equations of
 //!   one step; [`simulation`], step after step.
-//! * Imports run one way: `linear, nonlinear, bdf, signal, runtime <- rod, kinematics <- elastic, forces, fluid, contact <- model <- state, inputs <-
-//!   step <- simulation <- python`.
+//! * Imports run one way: `linear, nonlinear, bdf, signal, runtime <- rod, kinematics <- elastic, forces, fluid, contact, body <- model <- state,
+//!   inputs <- step <- simulation <- rollout <- python`.
 //! * [`simulation::Simulation`] is the way in; [`rollout`] takes many states of one model side by side.
 
 pub mod bdf;
+pub mod body;
 pub mod contact;
 pub mod elastic;
 pub mod fluid;

@@ -4,6 +4,7 @@ mod common;
 
 use common::{Random, chain_edges, chain_hinges, scene};
 use flagrs::Vec3;
+use flagrs::contact::exclusion::Exclusion;
 use flagrs::contact::spillmann::{ContactLaw, ContactSolver};
 use flagrs::kinematics::clamp::Motion;
 use flagrs::model::specification::{
@@ -52,7 +53,8 @@ fn forces_have_neither_resultant_nor_torque() {
     for _ in 0..2000 {
         let nodes: Vec<Vec3> = (0..4).map(|_| random.vector(1.0)).collect();
         let radius = [0.2, 0.35];
-        let law = ContactLaw::new(4, &edges, &[1.0, 1.0], &radius, 1.0, &[true, true], TOLERANCE, 10);
+        let exclusion = Exclusion::new(4, &edges, &[1.0, 1.0], &radius, 1.0);
+        let law = ContactLaw::new(&edges, &radius, exclusion, &[true, true], TOLERANCE, 10);
         let mut solver = ContactSolver::new(&law);
         let pass = solver.pass(&law, &nodes, &[1.0, 2.0, 3.0, 4.0]);
         pushed += pass.pushing;

@@ -92,8 +92,7 @@ impl Scene {
     fn direct(&self, targets: &[Vec3], density: &[f64]) -> Vec<f64> {
         let density: Vec<Vec3> = density.chunks_exact(3).map(Vec3::from_column_slice).collect();
         let mut out = vec![Vec3::zeros(); targets.len()];
-        let unit = 0.125 / std::f64::consts::PI;
-        velocity(targets, &self.nodes, &self.edges, &density, unit, &self.epsilon, &mut out, pool(2).as_ref());
+        velocity(targets, &self.nodes, &self.edges, &density, &self.epsilon, &mut out, pool(2).as_ref());
         out.iter().flat_map(|u| [u.x, u.y, u.z]).collect()
     }
 }

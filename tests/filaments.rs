@@ -30,14 +30,14 @@ fn straight(count: usize, edge: f64) -> Specification {
 
 #[test]
 fn the_robot_is_one_filament_and_clamped_flagella_are_one_each_beside_what_holds_them() {
-    let (_, robot) = filaments(scenes::robot(7.0, 20.0));
+    let (_, robot) = filaments(scenes::read("robot").specification);
     assert_eq!(robot.iter().map(|filament| filament.held).collect::<Vec<_>>(), [false]);
-    let (of_dof, flagella) = filaments(scenes::clamped_flagella(2));
+    let (of_dof, flagella) = filaments(scenes::read("two_clamped_flagella").specification);
     let free: Vec<_> = flagella.iter().filter(|filament| !filament.held).collect();
     assert_eq!((free.len(), flagella.len()), (2, 4));
     assert_eq!(of_dof.len(), 2 * (3 * 68 + 67));
     // A helix of 10 mm on 67 edges: a twentieth of the length is more than that, the shaft's held end included.
-    let scene = scenes::clamped_flagella(1);
+    let scene = scenes::read("one_clamped_flagellum").specification;
     let length: f64 = scene.edges.iter().map(|&[i, j]| (scene.nodes[j] - scene.nodes[i]).norm()).sum();
     assert!(free.iter().all(|filament| (filament.length - length).abs() < 1e-12), "{free:?}");
     assert!(free.iter().all(|filament| (filament.size - length / 20.0).abs() < 1e-12), "{free:?}");

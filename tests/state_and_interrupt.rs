@@ -15,8 +15,8 @@ use flagrs::step::scheme::Scheme;
 type Spoil = fn(&mut State);
 
 fn robot() -> Simulation {
-    let dt = scenes::robot_step(20.0);
-    Simulation::new(scenes::robot(7.0, 20.0), Scheme::Overdamped, dt, 1).expect("a valid scene")
+    let scenes::Canonical { specification, dt } = scenes::read("robot");
+    Simulation::new(specification, Scheme::Overdamped, dt, 1).expect("a valid scene")
 }
 
 #[test]

@@ -165,16 +165,7 @@ fn matrix_and_flow_agree_and_do_not_depend_on_threads() {
     let flow_on = |threads: usize| {
         let pool = pool(threads);
         let mut flow = vec![Vec3::zeros(); targets.len()];
-        velocity(
-            &targets,
-            &nodes,
-            &edges,
-            &density,
-            1.0 / (8.0 * std::f64::consts::PI),
-            &epsilon,
-            &mut flow,
-            Some(&pool),
-        );
+        velocity(&targets, &nodes, &edges, &density, &epsilon, &mut flow, Some(&pool));
         boundary.add_to_velocity(segments, &density, &targets, &mut flow, Some(&pool));
         flow
     };

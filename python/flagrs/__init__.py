@@ -16,8 +16,11 @@ from flagrs.guards import (
 from flagrs.reactions import Reaction
 from flagrs.rollout import Rollout, rollout
 from flagrs.scene import (
+    Capsule,
     Clamp,
     Contact,
+    Cylinder,
+    Ellipsoid,
     FlowFunction,
     Fluid,
     Head,
@@ -31,6 +34,7 @@ from flagrs.scene import (
     Rod,
     Rotation,
     Scene,
+    Sphere,
     Table,
     TimeFunction,
 )
@@ -43,10 +47,13 @@ from flagrs.version import installed_version
 __version__ = installed_version()
 
 __all__ = [
+    "Capsule",
     "Clamp",
     "Contact",
     "ContactWarning",
     "ConvergenceError",
+    "Cylinder",
+    "Ellipsoid",
     "EnergyWarning",
     "FileError",
     "FlagrsError",
@@ -70,6 +77,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
+    "Sphere",
     "StabilityWarning",
     "StationarityWarning",
     "StepWarning",

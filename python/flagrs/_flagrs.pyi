@@ -1,4 +1,4 @@
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -8,6 +8,7 @@ _Floats = npt.NDArray[np.float64]
 _Ints = npt.NDArray[np.int64]
 
 __all__ = [
+    "BodySurface",
     "FastMobility",
     "Simulation",
     "__version__",
@@ -19,6 +20,23 @@ __all__ = [
 ]
 
 __version__: str
+
+@final
+class BodySurface:
+    @staticmethod
+    def ellipsoid(semi_axes: Sequence[float], accuracy: float) -> BodySurface: ...
+    @staticmethod
+    def cylinder(radius: float, length: float, edge_radius: float, accuracy: float) -> BodySurface: ...
+    @property
+    def sources(self) -> _Floats: ...
+    @property
+    def points(self) -> _Floats: ...
+    @property
+    def error(self) -> float: ...
+    @property
+    def slip(self) -> float: ...
+    def resistance(self, viscosity: float) -> _Floats: ...
+    def forces(self, motion: Sequence[float], viscosity: float) -> _Floats: ...
 
 @final
 class FastMobility:
@@ -92,8 +110,7 @@ def velocity(
     at: _Floats,
     nodes: _Floats,
     edges: _Ints,
-    force_density: _Floats,
-    viscosity: float,
+    density: _Floats,
     epsilon: _Floats,
     threads: int,
 ) -> _Floats: ...

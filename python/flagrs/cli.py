@@ -13,9 +13,12 @@ from rich.console import Console
 from rich.table import Table as TextTable
 
 from flagrs import scenarios
+from flagrs.commands.export import export
 from flagrs.commands.measure import measure
+from flagrs.commands.movie import movie
+from flagrs.commands.plot import check_image, draw, plot
 from flagrs.commands.view import view
-from flagrs.errors import FileError, FlagrsError, SceneError, file_error, not_allowed
+from flagrs.errors import FlagrsError, SceneError
 from flagrs.progress import ProgressBar
 from flagrs.runs import Run, RunSettings, measured, run_to_file
 from flagrs.scene import Scene, toml
@@ -33,7 +36,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # it takes units in brackets for markup
 )
 
-for command in (measure, view):
+for command in (plot, view, movie, measure, export):
     app.command()(command)
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
@@ -104,7 +107,7 @@ def run(
     for warning in described.plan().warnings:
         typer.echo(f"warning: {warning}", err=True)
     if figure is not None:
-        _check_figure(figure)
+        check_image(figure)
     try:
         with ProgressBar(until, described.name, hidden=not sys.stderr.isatty()) as progress:
             done = run_to_file(described, path, settings, fresh=fresh, progress=progress)
@@ -113,7 +116,7 @@ def run(
         raise
     typer.echo(_report(done, path))
     if figure is not None:
-        _draw(done.trajectory, figure)
+        draw(done.trajectory, figure)
 
 
 @app.command("suggest")
@@ -127,17 +130,6 @@ def suggest_settings(
 ) -> None:
     """Say with which settings a scene is simulated to an error, and what no setting cures."""
     typer.echo(suggest(scene_from(scene, changes or []), error))
-
-
-@app.command()
-def plot(
-    file: Annotated[Path, typer.Argument(help="HDF5 file of a run, finished or not.")],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Image; by default FILE.png.")] = None,
-) -> None:
-    """Draw speed, head rate and shape of a run."""
-    image = output or file.with_suffix(".png")
-    _check_figure(image)
-    _draw(Trajectory.load(file), image)
 
 
 @app.command()
@@ -286,27 +278,6 @@ def _say_what_is_saved(path: Path) -> None:
     typer.echo(
         f"stopped; {path} holds {len(trajectory)} frames{until}, and the same command goes on", err=True
     )
-
-
-def _check_figure(path: Path) -> None:
-    """Raise SceneError, before anything runs, for an image of a kind that cannot be drawn."""
-    from matplotlib.backend_bases import FigureCanvasBase  # the other commands do without
-
-    known = FigureCanvasBase.get_supported_filetypes()
-    if path.suffix.removeprefix(".").lower() not in known:
-        raise not_allowed("figure", str(path), "a file ending in ." + ", .".join(sorted(known)))
-    if not path.parent.is_dir():
-        raise FileError(path, f"there is no folder {str(path.parent)!r}")
-
-
-def _draw(trajectory: Trajectory, path: Path) -> None:
-    from flagrs import plot as figures  # the command of this name hides the module
-
-    try:
-        figures.summary(trajectory).savefig(path, dpi=150)
-    except OSError as error:
-        raise file_error(path, error, "cannot be written") from None
-    typer.echo(f"drawn             {path}")
 
 
 def _print_rows(rows: Sequence[dict[str, Any]]) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from flagrs import _flagrs
+from flagrs.body_surface import BodySurface
 from flagrs.errors import SceneError
 from flagrs.force_density import check_edges
 from flagrs.memory import require_memory
@@ -14,7 +16,7 @@ from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
 from flagrs.threads import thread_count
 
-__all__ = ["FastMobility", "hat_weights", "mobility", "velocity"]
+__all__ = ["BodySurface", "FastMobility", "hat_weights", "mobility", "velocity"]
 
 
 def mobility(
@@ -117,7 +119,8 @@ def velocity(
     check_edges(force_density, pairs)
     mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
-    return _flagrs.velocity(at, sources, pairs, density, mu, widths, thread_count(threads))
+    scaled = density * (1.0 / (8.0 * math.pi * mu))
+    return _flagrs.velocity(at, sources, pairs, scaled, widths, thread_count(threads))
 
 
 class FastMobility:

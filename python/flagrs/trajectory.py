@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -23,7 +23,7 @@ from flagrs.guards import Notice, StationarityWarning, notices
 from flagrs.measures import along, angle_about, slope, spin_about, window
 from flagrs.reactions import Reaction, reaction_of
 from flagrs.results.bundle import Bundle, bundle_of
-from flagrs.results.material_frames import directors
+from flagrs.results.material_frames import directors, each_director
 from flagrs.results.readouts import ReadOuts, readouts_of
 from flagrs.results.swimming import Swimming, swimming_of
 from flagrs.scene import Head, Motor, Scene, Table, codec
@@ -33,6 +33,9 @@ from flagrs.scene.values import FloatArray, IntArray
 from flagrs.trajectory_file import Contents
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
+
     from flagrs.view import View
 
 
@@ -382,6 +385,10 @@ class Trajectory:
         chosen = np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64)
         return directors(self.scene, self.time, self.nodes, self.theta, chosen, self._contents.state)
 
+    def each_director(self) -> Iterator[FloatArray]:
+        """Yield the material director m1 (E, 3) of the edges, frame by frame, as `material_directors`."""
+        return each_director(self.scene, self.time, self.nodes, self.theta, self._contents.state)
+
     def swimming(self, start: float | None = None, end: float | None = None) -> Swimming:
         """Return the swimming velocity with its uncertainty, in the laboratory and along the swimmer's axis.
 
@@ -437,6 +444,32 @@ class Trajectory:
             If the scene has no immersed filament.
         """
         return bundle_of(self, np.arange(len(self)) if frames is None else np.asarray(frames, dtype=np.int64))
+
+    @property
+    def manifest(self) -> dict[str, str]:
+        """Where the run comes from: version of flagrs, time of creation, scene and settings as JSON."""
+        return dict(self._contents.manifest)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the run as an xarray Dataset with units; see `flagrs.export.arrays.to_xarray`."""
+        from flagrs.export.arrays import to_xarray  # exports read trajectories, so they are above this module
+
+        return to_xarray(self)
+
+    def to_pandas(self, of: str = "frames") -> pandas.DataFrame:
+        """Return the run as a table, a row for each of its ``frames`` or of the ``nodes`` in them.
+
+        Units are in the names of the columns; see `flagrs.export.arrays.to_pandas`.
+        """
+        from flagrs.export.arrays import to_pandas  # exports read trajectories, so they are above this module
+
+        return to_pandas(self, of)
+
+    def export(self, to: str, path: str | Path) -> list[Path]:
+        """Write the run as ``vtkhdf``, ``xarray``, ``npz`` or ``csv``; see `flagrs.export.export`."""
+        from flagrs.export import export  # exports read trajectories, so they are above this module
+
+        return export(self, to, path)
 
     def view(self, **options: Any) -> View:
         """Return the run in three dimensions, for a notebook or a page to `save`; see `flagrs.view.view`."""

@@ -32,14 +32,11 @@ pub struct ContactLaw {
 }
 
 impl ContactLaw {
-    /// `radius` (E) and `rest_lengths` (E) in m; `exclusion` is the excluded rest arc length in sums of radii, `tolerance` the
-    /// deepest overlap left in sums of radii.
+    /// `radius` (E) in m, `exclusion` of the same edges; `tolerance` is the deepest overlap left in sums of radii.
     pub fn new(
-        node_count: usize,
         edges: &[[usize; 2]],
-        rest_lengths: &[f64],
         radius: &[f64],
-        exclusion: f64,
+        exclusion: Exclusion,
         colliding: &[bool],
         tolerance: f64,
         max_iterations: usize,
@@ -47,7 +44,7 @@ impl ContactLaw {
         Self {
             edges: edges.to_vec(),
             radius: radius.to_vec(),
-            exclusion: Exclusion::new(node_count, edges, rest_lengths, radius, exclusion),
+            exclusion,
             colliding: colliding.to_vec(),
             tolerance,
             max_iterations,

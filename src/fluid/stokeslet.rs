@@ -209,8 +209,8 @@ impl Collect for Columns<'_> {
 
 /// Fills `out` with the velocity (m/s) of the fluid at `points` (m).
 ///
-/// `density` (N) is the force per length (N/m) that the network exerts on the fluid at its nodes, `viscosity` is in Pa s;
-/// the other arguments are those of [`mobility`], whose product with the density this is, without the matrix.
+/// `density` (N) is the force per length that the network exerts on the fluid at its nodes over `8 pi mu`, in m/s; the other
+/// arguments are those of [`mobility`], whose product with that density this is, without the matrix.
 ///
 /// # Panics
 ///
@@ -220,7 +220,6 @@ pub fn velocity(
     nodes: &[Vec3],
     edges: &[[usize; 2]],
     density: &[Vec3],
-    viscosity: f64,
     epsilon: &[f64],
     out: &mut [Vec3],
     pool: Option<&ThreadPool>,
@@ -229,11 +228,9 @@ pub fn velocity(
     assert_eq!(out.len(), points.len(), "out must hold one velocity for every point");
     assert_eq!(density.len(), nodes.len(), "density must hold one vector for every node");
     check_edges(nodes, edges, epsilon);
-    let scale = 1.0 / (8.0 * std::f64::consts::PI * viscosity);
     let segments: Vec<Segment> =
         edges.iter().zip(epsilon).map(|(&[i, j], &epsilon)| Segment::new(&nodes[i], &nodes[j], epsilon)).collect();
-    let densities: Vec<[[f64; 3]; 2]> =
-        edges.iter().map(|edge| edge.map(|node| (density[node] * scale).into())).collect();
+    let densities: Vec<[[f64; 3]; 2]> = edges.iter().map(|edge| edge.map(|node| density[node].into())).collect();
     let fill = |(points, out): (&[Vec3], &mut [Vec3])| {
         let mut flow = Flow { velocity: coordinates_mut(out), densities: &densities };
         for_each_pair(path, &segments, points, &mut flow);

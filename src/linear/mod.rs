@@ -5,6 +5,7 @@
 //! * [`ldlt`]: LDL^T of a symmetric one (faer).
 //! * [`nearly_symmetric`]: the one of these two that a matrix needs.
 //! * [`dense`]: LU of a dense unsymmetric matrix (faer).
+//! * [`pseudo_inverse`]: least squares, cut off where a matrix is singular to working precision.
 //! * [`krylov`]: right-preconditioned GMRES for operators that are only known by their action.
 
 pub mod dense;
@@ -12,6 +13,7 @@ pub mod krylov;
 pub mod ldlt;
 pub mod nearly_symmetric;
 pub mod pattern;
+pub mod pseudo_inverse;
 pub mod sparse;
 
 /// A linear system could not be solved.

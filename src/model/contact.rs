@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::Vec3;
 use crate::contact::bodies::{Bodies, Body};
+use crate::contact::exclusion::Exclusion;
 use crate::contact::friction::Friction;
 use crate::contact::potential::BarrierLaw;
 use crate::contact::spillmann::ContactLaw;
@@ -47,16 +48,8 @@ impl ContactModel {
         let colliding = &specification.colliding;
         match &specification.method {
             &ContactMethodSpecification::SpillmannTeschner { tolerance, max_iterations } => {
-                let law = ContactLaw::new(
-                    count,
-                    edges,
-                    rest_lengths,
-                    radius,
-                    exclusion,
-                    colliding,
-                    tolerance,
-                    max_iterations,
-                );
+                let exclusion = Exclusion::new(count, edges, rest_lengths, radius, exclusion);
+                let law = ContactLaw::new(edges, radius, exclusion, colliding, tolerance, max_iterations);
                 Self::SpillmannTeschner(law)
             }
             ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocities, spheres } => {

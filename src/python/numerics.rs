@@ -43,27 +43,26 @@ pub fn mobility<'py>(
         .reshape_with_order([3 * targets.len(), 3 * nodes.len()], numpy::npyffi::NPY_ORDER::NPY_FORTRANORDER)
 }
 
-/// Velocity at the points, (M, 3).
+/// Velocity at the points, (M, 3), for a force density over `8 pi mu`.
 #[pyfunction]
 pub fn velocity<'py>(
     py: Python<'py>,
     at: PyReadonlyArray2<'py, f64>,
     nodes: PyReadonlyArray2<'py, f64>,
     edges: PyReadonlyArray2<'py, i64>,
-    force_density: PyReadonlyArray2<'py, f64>,
-    viscosity: f64,
+    density: PyReadonlyArray2<'py, f64>,
     epsilon: PyReadonlyArray1<'py, f64>,
     threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let at = points(py, "points", &at)?;
     let nodes = points(py, "nodes", &nodes)?;
-    let density = points(py, "force_density", &force_density)?;
+    let density = points(py, "force_density", &density)?;
     let edges = pairs(py, "edges", &edges, nodes.len())?;
     let epsilon = regularizations(py, &epsilon, edges.len())?;
     let mut out = vec![crate::Vec3::zeros(); at.len()];
     py.detach(|| {
         let pool = threads::pool(threads);
-        stokeslet::velocity(&at, &nodes, &edges, &density, viscosity, &epsilon, &mut out, pool.as_deref());
+        stokeslet::velocity(&at, &nodes, &edges, &density, &epsilon, &mut out, pool.as_deref());
     });
     from_points(py, &out)
 }

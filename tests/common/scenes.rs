@@ -1,240 +1,361 @@
-//! The canonical scenes of tests and benches: a helix, the robot, and clamped flagella (docs/theory, "Scenes").
+//! The canonical scenes of tests and benches, read from files that `tests/scenes/make_scenes.py` writes.
 #![allow(dead_code)]
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::path::Path;
 
-use flagrs::Vec3;
 use flagrs::contact::stiffness::Stiffness;
 use flagrs::fluid::product::FarFieldChoice;
 use flagrs::kinematics::clamp::Motion;
 use flagrs::model::specification::{
-    ClampSpecification, ContactMethodSpecification, ContactSpecification, FluidModelSpecification, FluidSpecification,
-    HeadSpecification, MotorSpecification, Specification,
+    ClampSpecification, ContactMethodSpecification, ContactSpecification, FlowSpecification, FluidModelSpecification,
+    FluidSpecification, Frame, HeadSpecification, LoadKind, LoadSpecification, MagnetismSpecification,
+    MotorSpecification, Specification,
 };
 use flagrs::signal::Signal;
+use flagrs::{Mat3, Vec3};
+use serde::Deserialize;
 
-/// Least arc length of an edge of the flagella, m.
-const EDGE_LENGTH: f64 = 5e-3;
-/// Turn of the motor or clamp in a step of the implicit schemes, rad; the default of the Python package.
-const TURN_PER_STEP: f64 = 0.05;
+/// Every scene, by the name of its file.
+pub const NAMES: [&str; 13] = [
+    "robot",
+    "robot_of_pitch_5",
+    "robot_of_pitch_9",
+    "one_clamped_flagellum",
+    "two_clamped_flagella",
+    "five_clamped_flagella",
+    "free_helix",
+    "free_fibre",
+    "branched_network",
+    "torque_motor",
+    "loads",
+    "friction_rail",
+    "rail_by_passes",
+];
 
-/// Speed of the clamped flagella, rad/s.
-const CLAMP_SPEED: f64 = 15.0;
-
-/// A helix: radius of the centreline, advance per turn and total advance, m.
-#[derive(Clone, Copy)]
-struct Helix {
-    radius: f64,
-    pitch: f64,
-    axial_length: f64,
+/// A scene and the step when none is asked for, s.
+pub struct Canonical {
+    pub specification: Specification,
+    pub dt: f64,
 }
 
-impl Helix {
-    fn contour(&self) -> f64 {
-        self.axial_length / self.pitch * (TAU * self.radius).hypot(self.pitch)
-    }
-
-    fn edge_count(&self) -> usize {
-        (self.contour() / EDGE_LENGTH) as usize
-    }
-
-    /// Nodes about +x, from the axial position 0; `hand` is 1 for a right-handed helix and -1 for a left-handed one.
-    fn nodes(&self, edges: usize, hand: f64) -> Vec<Vec3> {
-        (0..=edges)
-            .map(|k| {
-                let along = self.axial_length * k as f64 / edges as f64;
-                let (sine, cosine) = (TAU * along / self.pitch).sin_cos();
-                Vec3::new(along, self.radius * cosine, hand * self.radius * sine)
-            })
-            .collect()
-    }
+/// The scene of a name.
+pub fn read(name: &str) -> Canonical {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes").join(name).with_extension("json");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let file: File = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    file.scene()
 }
 
-/// The robot's flagellum for a pitch given in helix radii.
-fn robot_flagellum(normalized_pitch: f64) -> Helix {
-    Helix { radius: 6.36e-3, pitch: normalized_pitch * 6.36e-3, axial_length: 95.4e-3 }
-}
-
-const CLAMPED_FLAGELLUM: Helix = Helix { radius: 10e-3, pitch: 50e-3, axial_length: 200e-3 };
-
-/// What the rods of a scene are made of, and what is around them.
-struct Substance {
-    youngs_modulus: f64,
-    poisson_ratio: f64,
-    density: f64,
-    radius: f64,
-    viscosity: f64,
-    epsilon: f64,
-}
-
-const ROBOT: Substance = Substance {
-    youngs_modulus: 1.255e6,
-    poisson_ratio: 0.5,
-    density: 1260.0,
-    radius: 1.6e-3,
-    viscosity: 1.0,
-    epsilon: 1.65e-3,
-};
-
-const CLAMPED: Substance = Substance {
-    youngs_modulus: 3e6,
-    poisson_ratio: 0.5,
-    density: 1000.0,
-    radius: 1e-3,
-    viscosity: 0.1,
-    epsilon: 1.02e-3,
-};
-
-/// Round rods at rest in their natural shape, immersed in a fluid of Stokeslet segments with twist drag.
-fn rods(chains: Vec<Vec<Vec3>>, substance: &Substance) -> Specification {
-    let (mut nodes, mut edges, mut hinges) = (Vec::new(), Vec::new(), Vec::new());
-    for chain in chains {
-        let (first_node, first_edge) = (nodes.len(), edges.len());
-        edges.extend((0..chain.len() - 1).map(|k| [first_node + k, first_node + k + 1]));
-        hinges.extend((0..chain.len() - 2).map(|k| [first_edge + k, first_edge + k + 1]));
-        nodes.extend(chain);
-    }
-    let (e, h) = (edges.len(), hinges.len());
-    let area = PI * substance.radius.powi(2);
-    let second_moment = 0.25 * area * substance.radius.powi(2);
-    let bending = substance.youngs_modulus * second_moment;
-    let shear_modulus = substance.youngs_modulus / (2.0 * (1.0 + substance.poisson_ratio));
-    Specification {
-        rest_nodes: nodes.clone(),
-        nodes,
-        edges,
-        hinges,
-        theta: vec![0.0; e],
-        directors: vec![],
-        radius: vec![substance.radius; e],
-        density: vec![substance.density; e],
-        stretching: vec![substance.youngs_modulus * area; e],
-        bending: vec![[[bending, 0.0], [0.0, bending]]; h],
-        twisting: vec![2.0 * shear_modulus * second_moment; h],
-        natural_curvature: vec![None; h],
-        natural_twist: vec![None; h],
-        motors: vec![],
-        head: None,
-        clamps: vec![],
-        loads: vec![],
-        magnetism: None,
-        flows: vec![],
-        gravity: Vec3::zeros(),
-        reynolds: vec![],
-        fluid: Some(FluidSpecification {
-            viscosity: substance.viscosity,
-            model: FluidModelSpecification::StokesletSegments {
-                epsilon: vec![substance.epsilon; e],
-                far_field: FarFieldChoice::NEVER,
-            },
-            immersed: vec![true; e],
-            twist_drag: true,
-            density: 0.0,
-        }),
-        contact: None,
-    }
-}
-
-/// Contact with the default options of the Python package, the stiffness (Pa) as it takes it from the scene.
-fn contact(colliding: Vec<bool>, stiffness: f64) -> ContactSpecification {
-    let method = ContactMethodSpecification::Barrier {
-        tolerance: 0.05,
-        stiffness: Stiffness::Uniform(stiffness),
-        friction: 0.0,
-        slip_velocities: Vec::new(),
-        spheres: Vec::new(),
-    };
-    ContactSpecification { method, exclusion: FRAC_PI_2, colliding }
-}
-
-/// Regularization of the robot's fluid, m.
-pub const ROBOT_EPSILON: f64 = ROBOT.epsilon;
-
-/// A free flagellum of the robot (pitch 7 helix radii), continued to any number of nodes; no contact.
+/// A free flagellum of the robot, without contact, of any number of nodes up to a thousand.
 pub fn helix(nodes: usize) -> Specification {
-    let flagellum = robot_flagellum(7.0);
-    let share = (nodes - 1) as f64 / flagellum.edge_count() as f64;
-    let continued = Helix { axial_length: flagellum.axial_length * share, ..flagellum };
-    rods(vec![continued.nodes(nodes - 1, -1.0)], &ROBOT)
-}
-
-/// The robot: two flagella, two motors, one head.
-pub fn robot(normalized_pitch: f64, rpm: f64) -> Specification {
-    let flagellum = robot_flagellum(normalized_pitch);
-    let flagellum: Vec<Vec3> = flagellum
-        .nodes(flagellum.edge_count(), -1.0)
-        .into_iter()
-        .map(|node| node + Vec3::new(2.0 * EDGE_LENGTH, 0.0, 0.0))
-        .collect();
-    let aside = Vec3::new(0.0, 14e-3, 0.0);
-    let shaft = |edges: f64| Vec3::new(edges * EDGE_LENGTH, 0.0, 0.0);
-    let base = flagellum.len() - 1;
-    let mut nodes: Vec<Vec3> = flagellum.iter().rev().map(|node| node - aside).collect();
-    nodes.extend([shaft(2.0) - aside, shaft(1.0) - aside, -aside, Vec3::zeros()]);
-    nodes.extend([aside, shaft(1.0) + aside, shaft(2.0) + aside]);
-    nodes.extend(flagellum.iter().map(|node| node + aside));
-    let mut scene = rods(vec![nodes], &ROBOT);
-
-    // The six edges between the two axis points lie in the head.
-    let outside: Vec<bool> = (0..scene.edges.len()).map(|edge| !(base + 1..base + 7).contains(&edge)).collect();
-    let speed = Signal::Constant(rpm * TAU / 60.0);
-    let motor =
-        |hinge, shaft_second| MotorSpecification { hinge, shaft_second, by_torque: false, signal: speed.clone() };
-    scene.motors = vec![motor(base + 1, false), motor(base + 5, true)];
-    let head_radius = 31e-3_f64;
-    scene.head = Some(HeadSpecification {
-        node: base + 4,
-        edges: vec![base + 3, base + 4],
-        translation: 4.1 * 6.0 * PI * ROBOT.viscosity * head_radius,
-        rotation: 0.9 * 8.0 * PI * ROBOT.viscosity * head_radius.powi(3),
-        mass: 0.0,
-    });
-    if let Some(fluid) = &mut scene.fluid {
-        fluid.immersed.clone_from(&outside);
+    let mut scene = read("free_helix").specification;
+    assert!(nodes <= scene.nodes.len(), "the file has {} nodes", scene.nodes.len());
+    let (edges, hinges) = (nodes - 1, nodes - 2);
+    scene.nodes.truncate(nodes);
+    scene.rest_nodes.truncate(nodes);
+    scene.reynolds.truncate(nodes);
+    scene.edges.truncate(edges);
+    scene.hinges.truncate(hinges);
+    for values in [&mut scene.theta, &mut scene.radius, &mut scene.density, &mut scene.stretching] {
+        values.truncate(edges);
     }
-    scene.contact = Some(contact(outside, 4.94e3));
+    scene.bending.truncate(hinges);
+    scene.twisting.truncate(hinges);
+    scene.natural_curvature.truncate(hinges);
+    scene.natural_twist.truncate(hinges);
+    let fluid = scene.fluid.as_mut().expect("a helix in a fluid");
+    fluid.immersed.truncate(edges);
+    match &mut fluid.model {
+        FluidModelSpecification::StokesletSegments { epsilon, .. } => epsilon.truncate(edges),
+        FluidModelSpecification::ResistiveForce { .. } => panic!("the helix is in a fluid of segments"),
+    }
     scene
 }
 
-/// Step of the implicit schemes for the robot, s.
-pub fn robot_step(rpm: f64) -> f64 {
-    TURN_PER_STEP / (rpm * TAU / 60.0)
+/// Regularization of every edge of a scene, m.
+pub fn epsilon(scene: &Specification) -> Vec<f64> {
+    match &scene.fluid.as_ref().expect("a scene in a fluid").model {
+        FluidModelSpecification::StokesletSegments { epsilon, .. } => epsilon.clone(),
+        FluidModelSpecification::ResistiveForce { .. } => panic!("a fluid without regularization"),
+    }
 }
 
-/// Flagella clamped on a regular polygon with sides of 30 mm, turned against their handedness at 15 rad/s.
-pub fn clamped_flagella(count: usize) -> Specification {
-    let helix = CLAMPED_FLAGELLUM;
-    let edges = helix.edge_count();
-    let edge = helix.contour() / edges as f64;
-    let lead_in = (2.0_f64.sqrt() * helix.radius / edge) as usize;
-    let mut flagellum = vec![Vec3::new(-edge - helix.radius, 0.0, 0.0)];
-    flagellum.extend((0..lead_in).map(|k| {
-        let along = helix.radius * k as f64 / lead_in as f64;
-        Vec3::new(along - helix.radius, along, 0.0)
-    }));
-    flagellum.extend(helix.nodes(edges, 1.0));
-    let circumradius = if count == 1 { 0.0 } else { 30e-3 / (2.0 * (PI / count as f64).sin()) };
-    let chains = (0..count)
-        .map(|k| {
-            let (sine, cosine) = (TAU * k as f64 / count as f64).sin_cos();
-            let corner = Vec3::new(0.0, circumradius * cosine, circumradius * sine);
-            flagellum.iter().map(|node| node + corner).collect()
-        })
-        .collect();
-    let mut scene = rods(chains, &CLAMPED);
-    scene.clamps = (0..count)
-        .map(|k| ClampSpecification {
-            nodes: vec![k * flagellum.len(), k * flagellum.len() + 1],
-            edges: vec![k * (flagellum.len() - 1)],
-            axes: [true; 3],
-            motion: Motion { spin: Signal::Constant(-CLAMP_SPEED), ..Motion::still() },
-        })
-        .collect();
-    scene.contact = Some(contact(vec![true; scene.edges.len()], 1.076e4));
-    scene
+/// What a file holds; an array with a single entry has it everywhere.
+#[derive(Deserialize)]
+struct File {
+    nodes: Vec<[f64; 3]>,
+    rest_nodes: Option<Vec<[f64; 3]>>,
+    edges: Vec<[usize; 2]>,
+    hinges: Vec<[usize; 2]>,
+    theta: Vec<f64>,
+    directors: Vec<(usize, [f64; 3])>,
+    radius: Vec<f64>,
+    density: Vec<f64>,
+    stretching: Vec<f64>,
+    bending: Vec<[[f64; 2]; 2]>,
+    twisting: Vec<f64>,
+    natural_curvature: Vec<[Option<f64>; 2]>,
+    natural_twist: Vec<Option<f64>>,
+    motors: Vec<Motor>,
+    head: Option<Head>,
+    clamps: Vec<Clamp>,
+    loads: Vec<Load>,
+    magnetism: Option<Magnetism>,
+    flows: Vec<Flow>,
+    gravity: [f64; 3],
+    reynolds: Vec<f64>,
+    fluid: Option<Fluid>,
+    contact: Option<Contact>,
+    dt: f64,
 }
 
-/// Step of the implicit schemes for the clamped flagella, s.
-pub fn clamped_step() -> f64 {
-    TURN_PER_STEP / CLAMP_SPEED
+/// A number, or times and samples.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Course {
+    Constant(f64),
+    Table(Vec<f64>, Vec<f64>),
+}
+
+#[derive(Deserialize)]
+struct Motor {
+    hinge: usize,
+    shaft_second: bool,
+    by_torque: bool,
+    signal: Course,
+}
+
+#[derive(Deserialize)]
+struct Head {
+    node: usize,
+    edges: Vec<usize>,
+    translation: f64,
+    rotation: f64,
+    mass: f64,
+}
+
+#[derive(Deserialize)]
+struct Clamp {
+    nodes: Vec<usize>,
+    edges: Vec<usize>,
+    axes: [bool; 3],
+    angular_velocity: Course,
+    velocity: [Course; 3],
+    displacement: [Course; 3],
+    /// No canonical scene has one.
+    turning: Option<()>,
+}
+
+#[derive(Deserialize)]
+struct Load {
+    kind: String,
+    material: bool,
+    nodes: Vec<usize>,
+    edges: Vec<usize>,
+    signal: [Course; 3],
+}
+
+#[derive(Deserialize)]
+struct Magnetism {
+    moments: Vec<(usize, [f64; 3])>,
+    field: [Course; 3],
+    gradient: [[f64; 3]; 3],
+}
+
+/// The linear one is the only kind that canonical scenes have.
+#[derive(Deserialize)]
+struct Flow {
+    velocity: [Course; 3],
+    gradient: [[f64; 3]; 3],
+    strength: Course,
+    center: [f64; 3],
+}
+
+#[derive(Deserialize)]
+struct Fluid {
+    viscosity: f64,
+    immersed: Vec<bool>,
+    twist_drag: bool,
+    density: f64,
+    far_field_error: f64,
+    far_field_nodes: usize,
+    epsilon: Option<Vec<f64>>,
+    coefficients: Option<Vec<[f64; 2]>>,
+}
+
+#[derive(Deserialize)]
+struct Contact {
+    barrier: bool,
+    tolerance: f64,
+    max_iterations: usize,
+    stiffness: Option<f64>,
+    driven: Vec<f64>,
+    /// Null is infinite.
+    bent: Vec<Option<f64>>,
+    friction: f64,
+    slip_velocities: Vec<f64>,
+    spheres: Vec<(usize, f64)>,
+    exclusion: f64,
+    colliding: Vec<bool>,
+}
+
+/// An array of so many entries.
+fn filled<T: Clone>(values: Vec<T>, count: usize) -> Vec<T> {
+    let all = if values.len() == 1 { vec![values[0].clone(); count] } else { values };
+    assert_eq!(all.len(), count);
+    all
+}
+
+fn matrix(rows: [[f64; 3]; 3]) -> Mat3 {
+    Mat3::from_fn(|row, column| rows[row][column])
+}
+
+impl Course {
+    fn signal(self) -> Signal {
+        match self {
+            Self::Constant(value) => Signal::Constant(value),
+            Self::Table(times, values) => Signal::Table { times, values },
+        }
+    }
+}
+
+impl File {
+    fn scene(self) -> Canonical {
+        let (n, e, h) = (self.nodes.len(), self.edges.len(), self.hinges.len());
+        let points = |rows: &[[f64; 3]]| rows.iter().map(|&row| Vec3::from(row)).collect::<Vec<_>>();
+        let curvature = |[first, second]: [Option<f64>; 2]| first.zip(second).map(|(first, second)| [first, second]);
+        let specification = Specification {
+            rest_nodes: points(self.rest_nodes.as_ref().unwrap_or(&self.nodes)),
+            nodes: points(&self.nodes),
+            theta: filled(self.theta, e),
+            directors: self.directors.into_iter().map(|(edge, director)| (edge, Vec3::from(director))).collect(),
+            radius: filled(self.radius, e),
+            density: filled(self.density, e),
+            stretching: filled(self.stretching, e),
+            bending: filled(self.bending, h),
+            twisting: filled(self.twisting, h),
+            natural_curvature: filled(self.natural_curvature, h).into_iter().map(curvature).collect(),
+            natural_twist: filled(self.natural_twist, h),
+            motors: self.motors.into_iter().map(Motor::specification).collect(),
+            head: self.head.map(Head::specification),
+            clamps: self.clamps.into_iter().map(Clamp::specification).collect(),
+            loads: self.loads.into_iter().map(Load::specification).collect(),
+            magnetism: self.magnetism.map(Magnetism::specification),
+            flows: self.flows.into_iter().map(Flow::specification).collect(),
+            gravity: Vec3::from(self.gravity),
+            reynolds: filled(self.reynolds, n),
+            fluid: self.fluid.map(|fluid| fluid.specification(e)),
+            contact: self.contact.map(|contact| contact.specification(e)),
+            edges: self.edges,
+            hinges: self.hinges,
+        };
+        Canonical { specification, dt: self.dt }
+    }
+}
+
+impl Motor {
+    fn specification(self) -> MotorSpecification {
+        let Self { hinge, shaft_second, by_torque, signal } = self;
+        MotorSpecification { hinge, shaft_second, by_torque, signal: signal.signal() }
+    }
+}
+
+impl Head {
+    fn specification(self) -> HeadSpecification {
+        let Self { node, edges, translation, rotation, mass } = self;
+        HeadSpecification { node, edges, translation, rotation, mass }
+    }
+}
+
+impl Clamp {
+    fn specification(self) -> ClampSpecification {
+        assert!(self.turning.is_none(), "canonical scenes have no clamp that turns");
+        let motion = Motion {
+            velocity: self.velocity.map(Course::signal),
+            displacement: self.displacement.map(Course::signal),
+            turning: None,
+            spin: self.angular_velocity.signal(),
+        };
+        ClampSpecification { nodes: self.nodes, edges: self.edges, axes: self.axes, motion }
+    }
+}
+
+impl Load {
+    fn specification(self) -> LoadSpecification {
+        let kind = match self.kind.as_str() {
+            "node force" => LoadKind::NodeForce { node: self.nodes[0], edge: self.edges[0] },
+            "edge torque" => LoadKind::EdgeTorque { edge: self.edges[0] },
+            "force per length" => LoadKind::ForcePerLength { edges: self.edges },
+            "torque per length" => LoadKind::TorquePerLength { edges: self.edges },
+            other => panic!("a load of unknown kind {other}"),
+        };
+        let frame = if self.material { Frame::Material } else { Frame::Laboratory };
+        LoadSpecification { kind, frame, signal: self.signal.map(Course::signal) }
+    }
+}
+
+impl Magnetism {
+    fn specification(self) -> MagnetismSpecification {
+        MagnetismSpecification {
+            moments: self.moments.into_iter().map(|(edge, moment)| (edge, Vec3::from(moment))).collect(),
+            field: self.field.map(Course::signal),
+            gradient: matrix(self.gradient),
+        }
+    }
+}
+
+impl Flow {
+    fn specification(self) -> FlowSpecification {
+        FlowSpecification::Linear {
+            velocity: self.velocity.map(Course::signal),
+            gradient: matrix(self.gradient),
+            strength: self.strength.signal(),
+            center: Vec3::from(self.center),
+        }
+    }
+}
+
+impl Fluid {
+    fn specification(self, edges: usize) -> FluidSpecification {
+        let far_field = FarFieldChoice { from: self.far_field_nodes, error: self.far_field_error };
+        let model = match (self.epsilon, self.coefficients) {
+            (Some(epsilon), None) => {
+                FluidModelSpecification::StokesletSegments { epsilon: filled(epsilon, edges), far_field }
+            }
+            (None, Some(coefficients)) => {
+                FluidModelSpecification::ResistiveForce { coefficients: filled(coefficients, edges) }
+            }
+            _ => panic!("a fluid has either regularizations or coefficients"),
+        };
+        FluidSpecification {
+            viscosity: self.viscosity,
+            model,
+            immersed: filled(self.immersed, edges),
+            twist_drag: self.twist_drag,
+            density: self.density,
+        }
+    }
+}
+
+impl Contact {
+    fn specification(self, edges: usize) -> ContactSpecification {
+        let bodies = edges + self.spheres.len();
+        let driven = filled(self.driven, bodies);
+        let bent = filled(self.bent, bodies).into_iter().map(|force| force.unwrap_or(f64::INFINITY)).collect();
+        let method = if self.barrier {
+            ContactMethodSpecification::Barrier {
+                tolerance: self.tolerance,
+                stiffness: self.stiffness.map_or(Stiffness::Typical { driven, bent }, Stiffness::Uniform),
+                friction: self.friction,
+                slip_velocities: filled(self.slip_velocities, bodies),
+                spheres: self.spheres,
+            }
+        } else {
+            ContactMethodSpecification::SpillmannTeschner {
+                tolerance: self.tolerance,
+                max_iterations: self.max_iterations,
+            }
+        };
+        ContactSpecification { method, exclusion: self.exclusion, colliding: filled(self.colliding, edges) }
+    }
 }

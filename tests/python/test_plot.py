@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import csv
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fake_simulation import RATE, SPEED, FakeSimulation, rigid_frame
-from flagrs import FlagrsError, Scene, plot, scenarios
+from flagrs import FileError, FlagrsError, Fluid, Rod, Scene, SceneError, plot, scenarios
+from flagrs.plot.canvas import new_figure
 from flagrs.plot.shape import filaments, unit_of
+from flagrs.plot.table import series_of
+from flagrs.plot.tubes import look_of, tubes
+from flagrs.plot.units import prefixed
 from flagrs.recorder import Recorder
 from flagrs.trajectory import Trajectory
+from matplotlib import rcParams
+from matplotlib.collections import PolyCollection
 
 SCENES = [scenarios.build(name) for name in scenarios.list()]
 
@@ -58,11 +66,140 @@ def test_the_views_of_a_shape_have_equal_scales() -> None:
 
 def test_the_shape_is_that_of_the_nearest_frame() -> None:
     trajectory = run_of(scenarios.straight_rod())
-    panel = drawn(plot.shape(trajectory, time=1.04))[0]
-    segments = np.concatenate(
-        [lines for collection in panel.collections for lines in collection.get_segments()]
+    figure = plot.shape(trajectory, time=1.04)
+    drawn(figure)
+    across = series_of(figure)[0].columns["x [mm]"]
+    assert across == pytest.approx(1e3 * trajectory.nodes[10, :, 0], rel=1e-12)
+
+
+def test_rods_are_drawn_with_their_radius() -> None:
+    scene = scenarios.straight_rod()
+    panel = drawn(plot.shape(run_of(scene)))[0]
+    tube = next(collection for collection in panel.collections if isinstance(collection, PolyCollection))
+    heights = np.concatenate([path.vertices[:, 1] for path in tube.get_paths()])
+    radius = 1e3 * float(scene.rods[0].radius_array()[0])
+    assert np.ptp(heights) == pytest.approx(2.0 * radius, rel=1e-6)
+
+
+def test_the_nearer_of_two_crossing_rods_is_drawn_last() -> None:
+    silicone = scenarios.robot().rods[0].material
+    low = Rod.straight(length=0.1, edge_count=9, radius=1e-3, material=silicone, start=(-0.05, 0.0, 0.0))
+    high = low.replace(nodes=low.nodes[:, [1, 0, 2]] + [0.0, 0.0, 2.1e-3])
+    for rods, nearer in (((low, high), 1), ((high, low), 0)):
+        look = look_of(Scene(rods=rods))
+        faces = tubes(look, np.concatenate([rod.nodes for rod in rods])).get_facecolor()[:, :3]
+        bodies = [[np.allclose(face, tone) for face in faces] for tone in look.tones[1][[0, -1]]]
+        last = [int(np.flatnonzero(which)[-1]) for which in bodies]
+        assert last[nearer] > last[1 - nearer]
+
+
+def test_a_table_holds_what_is_drawn(tmp_path: Path) -> None:
+    trajectory = run_of(scenarios.robot())
+    figure = plot.summary(trajectory)
+    rows = list(csv.DictReader(plot.save_table(figure, tmp_path / "t.csv").open(encoding="utf-8")))
+    torque = [float(row["torque [mN m]"]) for row in rows if row["series"] == "motor 1"]
+    assert torque == pytest.approx(1e3 * trajectory.torque()[:, 1], rel=1e-15)
+    lines = [line for panel in figure.axes[:3] for line in panel.get_lines() if len(line.get_xdata()) > 2]
+    noted = [series for series in series_of(figure) if "time [s]" in series.columns]
+    assert len(lines) == len(noted) == 4
+    for line, series in zip(lines, noted):
+        assert line.get_xdata() == pytest.approx(series.columns["time [s]"])
+        assert line.get_ydata() == pytest.approx(list(series.columns.values())[1])
+
+
+def test_a_figure_without_numbers_has_no_table(tmp_path: Path) -> None:
+    with pytest.raises(FlagrsError, match="no numbers"):
+        plot.save_table(new_figure(1.0, 1.0), tmp_path / "t.csv")
+    with pytest.raises(FileError):
+        plot.save_table(plot.summary(run_of(scenarios.robot())), tmp_path / "none" / "t.csv")
+
+
+def pushed() -> Trajectory:
+    """Return two frames of a rod that pushes the fluid along x."""
+    scene = scenarios.straight_rod()
+    recorder = Recorder(None, scene.replace(fluid=Fluid(viscosity=2.0)), {})
+    for time in (0.0, 1.0):
+        frame = rigid_frame(scene, time)
+        frame["force_density"][:, 0] = 1e-3
+        recorder.append(frame)
+    return recorder.trajectory()
+
+
+@pytest.mark.parametrize("plane", ["xy", "xz", "yz"])
+def test_a_flow_figure_shows_the_flow_at_the_points_of_the_plane(plane: str) -> None:
+    trajectory = pushed()
+    figure = plot.flow(trajectory, plane=plane, at=0.01, points=12)
+    drawn(figure)
+    columns = series_of(figure)[0].columns
+    length, rate = (
+        next(key.split("[")[1][:-1] for key in columns if key.startswith(word))
+        for word in (plane[0], "speed")
     )
-    assert segments[0] == pytest.approx(1e3 * trajectory.nodes[10, 0, :2], rel=1e-12)
+    size = {"m": 1.0, "mm": 1e-3, "µm": 1e-6}[length]
+    points = np.full((len(columns[f"speed [{rate}]"]), 3), 0.01)
+    for axis in plane:
+        points[:, "xyz".index(axis)] = size * columns[f"{axis} [{length}]"]
+    fast = {"m/s": 1.0, "mm/s": 1e-3, "µm/s": 1e-6}[rate]
+    velocity = fast * np.stack([columns[f"u_{axis} [{rate}]"] for axis in "xyz"], axis=1)
+    assert velocity == pytest.approx(trajectory.flow(points), rel=1e-9, abs=1e-15)
+
+
+def test_a_flow_of_what_has_none_is_refused() -> None:
+    with pytest.raises(SceneError, match="plane"):
+        plot.flow(pushed(), plane="zz")
+    with pytest.raises(FlagrsError, match="Stokeslet"):
+        plot.flow(run_of(scenarios.cantilever()))
+
+
+def test_kymographs_show_curvature_beyond_rest_and_tension_along_each_filament() -> None:
+    scene = scenarios.robot()
+    recorder = Recorder(None, scene, {})
+    for time in np.arange(5.0):
+        frame = rigid_frame(scene, float(time))
+        frame["nodes"] *= 1.0 + 1e-3 * time
+        recorder.append(frame)
+    trajectory = recorder.trajectory()
+    stiffness = float(scene.rods[0].EA_array()[0])
+    # Stretched all over, it keeps its angles, and so its curvature per length at rest.
+    for draw, edges, factor in ((plot.curvature, 25, 0.0), (plot.tension, 26, 1e-3 * stiffness)):
+        figure = draw(trajectory)
+        assert len(drawn(figure)) == 3
+        (label, values), unit = list(series_of(figure)[0].columns.items())[2], figure.axes[-1].get_ylabel()
+        assert label == unit
+        scale = {"mN": 1e3, "µN": 1e6, "N": 1.0}.get(unit[-3:-1].strip("["), 1.0)
+        expected = scale * factor * np.repeat(np.arange(5.0), edges)
+        assert values == pytest.approx(expected, rel=1e-9, abs=1e-9 if factor else 1e-12)
+        mesh = np.asarray(figure.axes[0].collections[0].get_array()).reshape(edges, 5)
+        assert mesh.T.ravel() == pytest.approx(values)
+
+
+def test_a_bundle_figure_says_what_is_missing() -> None:
+    pair = drawn(plot.bundle(run_of(scenarios.clamped_flagella())))
+    assert [len(panel.get_lines()) for panel in pair] == [1, 1, 1, 1]
+    alone = drawn(plot.bundle(run_of(scenarios.straight_rod())))
+    assert "needs 2 filaments" in alone[0].texts[0].get_text().replace("\n", " ")
+
+
+@pytest.mark.parametrize(("size", "millimetres"), [("column", 86.0), ("page", 178.0)])
+def test_printed_figures_are_as_wide_as_asked_for_and_leave_the_style_alone(
+    size: Any, millimetres: float
+) -> None:
+    before = rcParams["font.size"]
+    with plot.printed(size):
+        figure = plot.curvature(run_of(scenarios.robot()))
+        assert rcParams["font.size"] == 8.0
+    assert figure.get_figwidth() * 25.4 == pytest.approx(millimetres)
+    assert rcParams["font.size"] == before
+    with pytest.raises(SceneError, match="size"), plot.printed("poster"):  # type: ignore[arg-type]
+        pass
+
+
+@pytest.mark.parametrize(
+    ("size", "factor", "unit"),
+    [(0.0023, 1e3, "mN m"), (12.0, 1.0, "N m"), (1e-17, 1e18, "aN m"), (0.0, 1.0, "N m")],
+)
+def test_values_are_shown_with_the_prefix_they_read_best_with(size: float, factor: float, unit: str) -> None:
+    assert prefixed(size, "N m") == (factor, unit)
 
 
 def test_the_flagella_of_a_one_chain_robot_are_told_apart() -> None:

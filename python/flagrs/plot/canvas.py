@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagrs.errors import FlagrsError
+from flagrs.plot.printed import width_wanted
 from flagrs.scene.values import FloatArray
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ GREY = "#8a8a8a"
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of a size in inches, known to no window system.
+    """Return an empty figure of a size in inches, or `printed` width, known to no window system.
 
     Raises
     ------
@@ -31,6 +32,10 @@ def new_figure(width: float, height: float) -> Figure:
         from matplotlib.figure import Figure
     except ImportError:
         raise FlagrsError("figures need matplotlib: pip install 'flagrs[plot]'") from None
+    wanted = width_wanted.get()
+    if wanted is not None:
+        # Letters do not shrink along, so that a narrow figure needs some more of its height.
+        width, height = wanted, min(height * (wanted / width) ** 0.8, 9.5)
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from flagrs.errors import FlagrsError
 from flagrs.plot.canvas import COLOURS, dress, legend, new_figure
+from flagrs.plot.table import note
 from flagrs.units import rpm
 
 if TYPE_CHECKING:
@@ -41,6 +42,8 @@ def study(rows: Sequence[Mapping[str, Any]], by: str, label: str = "{}") -> Figu
     for number, value in enumerate(sorted({row[by] for row in usable})):
         line = sorted((row for row in usable if row[by] == value), key=lambda row: float(row["rpm"]))
         motor = [row["rpm"] for row in line]
+        speeds = [1e3 * row["swimming_speed"] for row in line]
+        heads = [row["head_rate"] / rpm(1.0) for row in line]
         style: dict[str, Any] = {
             "color": COLOURS[number % len(COLOURS)],
             "marker": _MARKERS[number % len(_MARKERS)],
@@ -48,8 +51,10 @@ def study(rows: Sequence[Mapping[str, Any]], by: str, label: str = "{}") -> Figu
             "linewidth": 1.2,
             "label": label.format(value),
         }
-        left.plot(motor, [1e3 * row["swimming_speed"] for row in line], **style)
-        right.plot(motor, [row["head_rate"] / rpm(1.0) for row in line], **style)
+        left.plot(motor, speeds, **style)
+        right.plot(motor, heads, **style)
+        note(left, style["label"], {"motor speed [rpm]": motor, "swimming speed [mm/s]": speeds})
+        note(right, style["label"], {"motor speed [rpm]": motor, "head rate [rpm]": heads})
     dress(left, "motor speed [rpm]", "swimming speed [mm/s]", "Swimming speed")
     dress(right, "motor speed [rpm]", "head rate [rpm]", "Rotation of the head")
     for panel in (left, right):

@@ -9,6 +9,8 @@ import numpy as np
 from flagrs.errors import FlagrsError
 from flagrs.measures import slope, window
 from flagrs.plot.canvas import COLOURS, calm, dress, legend, new_figure, say
+from flagrs.plot.table import note
+from flagrs.plot.units import prefixed
 from flagrs.scene.values import BoolArray, FloatArray
 from flagrs.units import rpm
 
@@ -47,10 +49,9 @@ def draw_speed(panel: Axes, trajectory: Trajectory) -> None:
     along = mean / size if size > 0.0 else np.array([1.0, 0.0, 0.0])
     rate = np.gradient(position @ along, trajectory.time)
     largest = max(size, float(np.abs(rate).max()))
-    factor, unit = next(
-        ((f, u) for f, u in ((1.0, "m/s"), (1e3, "mm/s"), (1e6, "µm/s")) if largest * f >= 1.0), (1e9, "nm/s")
-    )
+    factor, unit = prefixed(largest, "m/s")
     _draw_rate(panel, trajectory.time, factor * rate, inside, factor * size, unit)
+    note(panel, "speed", {"time [s]": trajectory.time, f"speed [{unit}]": factor * rate})
     who = "the head" if trajectory.scene.head else "the mean of all nodes"
     dress(panel, "time [s]", f"speed [{unit}]", f"Speed of {who}")
 
@@ -66,7 +67,8 @@ def draw_head_rate(panel: Axes, trajectory: Trajectory) -> None:
     rate = np.gradient(angle, trajectory.time)
     mean = float(slope(trajectory.time[inside], angle[inside]))
     _draw_rate(panel, trajectory.time, rate / rpm(1.0), inside, mean / rpm(1.0), "rpm")
-    dress(panel, "time [s]", "head rate [rpm]", "Rotation of the head about the shafts")
+    note(panel, "head", {"time [s]": trajectory.time, "head rate [rpm]": rate / rpm(1.0)})
+    dress(panel, "time [s]", "head rate [rpm]", "Rotation of the head")
 
 
 def _draw_rate(
@@ -86,8 +88,7 @@ def draw_torque(panel: Axes, trajectory: Trajectory) -> None:
         say(panel, "no motors")
         return
     largest = float(np.abs(torque).max())
-    steps = ((1.0, "N m"), (1e3, "mN m"), (1e6, "µN m"), (1e9, "nN m"))
-    factor, unit = next(((f, u) for f, u in steps if largest * f >= 1.0), steps[0])
+    factor, unit = prefixed(largest, "N m")
     for motor in range(torque.shape[1]):
         colour = COLOURS[motor % len(COLOURS)]
         panel.plot(
@@ -95,8 +96,10 @@ def draw_torque(panel: Axes, trajectory: Trajectory) -> None:
             factor * torque[:, motor],
             color=colour,
             linewidth=0.9,
-            label=f"motor {motor + 1}",
+            label=f"motor {motor}",
         )
+        columns = {"time [s]": trajectory.time, f"torque [{unit}]": factor * torque[:, motor]}
+        note(panel, f"motor {motor}", columns)
     calm(panel, factor * torque)
     legend(panel)
     dress(panel, "time [s]", f"torque [{unit}]", "Torque of the motors")
@@ -112,5 +115,6 @@ def draw_energy(panel: Axes, trajectory: Trajectory) -> None:
         if positive[:, part].any():
             values = np.where(positive[:, part], trajectory.energy[:, part], np.nan)
             panel.semilogy(trajectory.time, values, color=COLOURS[part], linewidth=0.9, label=name)
+            note(panel, name, {"time [s]": trajectory.time, "energy [J]": trajectory.energy[:, part]})
     legend(panel)
     dress(panel, "time [s]", "energy [J]", "Elastic energy")

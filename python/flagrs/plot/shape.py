@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagrs.errors import FlagrsError
-from flagrs.plot.canvas import COLOURS, GREY, dress, new_figure
+from flagrs.plot.canvas import GREY, dress, new_figure
+from flagrs.plot.table import note
+from flagrs.results.paths import paths_of
 from flagrs.scene import Rod, Scene
 from flagrs.scene.rod_topology import edges_at_nodes
 from flagrs.scene.values import FloatArray, IntArray
@@ -19,8 +21,8 @@ if TYPE_CHECKING:
 
     from flagrs.trajectory import Trajectory
 
-#: Horizontal axis, vertical axis and name of each view.
-VIEWS = ((0, 1, "from +z"), (0, 2, "from -y"), (1, 2, "from +x"))
+#: Axes across, up, and towards the viewer with its sign; and the name of each view.
+VIEWS = ((0, 1, 2, 1.0, "from +z"), (0, 2, 1, -1.0, "from -y"), (1, 2, 0, 1.0, "from +x"))
 
 
 def shape(trajectory: Trajectory, time: float | None = None) -> Figure:
@@ -57,10 +59,14 @@ def draw_views(axes: Sequence[Axes], trajectory: Trajectory, frame: int) -> None
     """Draw a frame into three axes, one per view, with the same unit on all."""
     nodes = trajectory.nodes[frame]
     factor, unit = unit_of(float(np.ptp(nodes, axis=0).max()))
-    for panel, (across, up, name) in zip(axes, VIEWS, strict=True):
-        _draw_view(panel, trajectory.scene, factor * nodes, factor, (across, up))
+    for panel, (across, up, out, sign, name) in zip(axes, VIEWS, strict=True):
+        draw_rods(panel, trajectory.scene, factor * nodes, factor, (across, up, out, sign))
         dress(panel, f"{'xyz'[across]} [{unit}]", f"{'xyz'[up]} [{unit}]", f"seen {name}")
         panel.set_aspect("equal", adjustable="datalim")
+        for number, path in enumerate(paths_of(trajectory.scene)):
+            places = factor * nodes[path.nodes]
+            columns = {f"{'xyz'[axis]} [{unit}]": places[:, axis] for axis in range(3)}
+            note(panel, f"rod {path.rod}, path {number}", {"node": path.nodes, **columns})
 
 
 def unit_of(size: float) -> tuple[float, str]:
@@ -71,27 +77,44 @@ def unit_of(size: float) -> tuple[float, str]:
     return 1e9, "nm"
 
 
-def _draw_view(panel: Axes, scene: Scene, nodes: FloatArray, factor: float, plane: tuple[int, int]) -> None:
-    from matplotlib.collections import LineCollection
+def draw_rods(
+    panel: Axes, scene: Scene, nodes: FloatArray, factor: float, view: tuple[int, int, int, float]
+) -> None:
+    """Draw rods as tubes of their radius, and the head, into axes in a unit of length.
+
+    Parameters
+    ----------
+    panel
+        Where to.
+    scene
+        The scene.
+    nodes
+        Positions (N, 3) in the unit of the axes.
+    factor
+        That unit in metres, inverted.
+    view
+        Axes across, up and out, and the sign of the direction from which the last is looked along.
+    """
     from matplotlib.patches import Circle
 
-    colour = 0
-    for number, rod in enumerate(scene.rods):
-        offset = scene.node_offset(number)
-        lines = nodes[offset : offset + len(rod.nodes)][:, plane][rod.edge_array()]
-        dry = lines[~rod.immersed_array()]
-        panel.add_collection(LineCollection(list(dry), colors=GREY, linewidths=2.0))
-        for piece in filaments(rod):
-            panel.add_collection(
-                LineCollection(list(lines[piece]), colors=COLOURS[colour % len(COLOURS)], linewidths=2.0)
-            )
-            colour += 1
+    from flagrs.plot.tubes import look_of, place, tubes
+
+    across, up, out, sign = view
+    seen = nodes[:, [across, up, out]] * [1.0, 1.0, sign]
+    look = look_of(scene)
+    drawn = tubes(look, seen)
+    place(drawn, look, seen, factor)
+    panel.add_collection(drawn)
+    low, high = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
     if scene.head is not None:
-        middle = nodes[scene.node_offset(scene.head.rod) + scene.head.node][list(plane)]
+        middle = seen[scene.node_offset(scene.head.rod) + scene.head.node]
         radius = factor * scene.head.radius
-        panel.add_patch(
-            Circle((middle[0], middle[1]), radius, facecolor="#d9d9d9", edgecolor=GREY, alpha=0.5)
-        )
+        low, high = np.minimum(low, middle[:2] - radius), np.maximum(high, middle[:2] + radius)
+        centre = (float(middle[0]), float(middle[1]))
+        panel.add_patch(Circle(centre, radius, facecolor="#d9d9d9", edgecolor="none", alpha=0.6, zorder=0.9))
+        panel.add_patch(Circle(centre, radius, facecolor="none", edgecolor=GREY, zorder=3.0))
+    thick = factor * float(look.radius.max())
+    panel.update_datalim([low - thick, high + thick])
     panel.autoscale_view()
 
 

@@ -19,9 +19,11 @@ from flagrs.scene.values import FloatArray, IntArray
 if TYPE_CHECKING:
     from flagrs.trajectory import Trajectory
 
-#: Share of a filament's displacement across the axis that one helix must explain for its phase to mean
-#: something.
-HELICAL = 0.5
+#: Coherence of two filaments from which the phase between them means something, and points along them it is
+#: taken at.
+COHERENT, PHASE_POINTS = 0.5, 64
+#: Fewest hinges of a filament that has a shape.
+LEAST_HINGES = 3
 
 
 @dataclass(frozen=True)
@@ -105,41 +107,51 @@ class Bundle:
         )
         return spread
 
-    @cached_property
-    def phase(self) -> FloatArray:
-        """Phases (T, F) of the filaments' helices about the axis, continued in time [rad].
+    def phase_lag(self) -> FloatArray:
+        """Return the phase (T, F - 1) of the others beyond the first filament's, within half a turn [rad].
 
-        Of a filament, ``y + i z`` across its own straight line from base to tip is compared with
-        ``exp(i k x)`` along it, with the wave number k of the shape at rest: the phase is that of their
-        product's integral. It rises as a filament turns right-handed about the axis.
+        It is the angle about the axis by which the first filament's curvature vectors must be turned to match
+        another's at the same share of their arc length, in the mean along them: that of equal helices,
+        right-handed about the axis. NaN where no angle makes them alike, as for filaments of other pitch or
+        handedness (a coherence below a half).
 
         Raises
         ------
         FlagrsError
-            If a filament is no helix: half of its displacement across the axis is something else.
+            If there is one filament only, or one is straight.
         """
-        phases = np.stack([self._phase(k) for k in range(len(self.filaments))], axis=1)
-        return np.unwrap(phases, axis=0)
+        self._need(2, "a phase lag")
+        first, *others = (self._winding(k) for k in range(len(self.filaments)))
+        columns = []
+        for number, other in enumerate(others, start=1):
+            size = np.sqrt((np.abs(first) ** 2).sum(axis=1) * (np.abs(other) ** 2).sum(axis=1))
+            if not size.all():
+                raise FlagrsError(f"filament 0 or {number} is straight; it has no phase")
+            product = (other * first.conj()).sum(axis=1) / size
+            columns.append(np.where(np.abs(product) >= COHERENT, np.angle(product), np.nan))
+        return np.stack(columns, axis=1)
 
-    def _phase(self, filament: int) -> FloatArray:
+    def _winding(self, filament: int) -> FloatArray:
+        """Return the curvature (T, K) across the axis as complex numbers, at even shares of the arc length.
+
+        Kinks, such as where a helix begins on its shaft, are left out: hinges that are bent twice as much as
+        most.
+        """
         path = self.filaments[filament]
         rest = np.concatenate([rod.rest_array() for rod in self.trajectory.scene.rods])[path.nodes]
-        wave = _wave_number(rest)
-        if wave is None:
-            raise FlagrsError(f"filament {filament} is no helix at rest; it has no phase")
-        parts = [_helix_part(shape, self.axis, wave) for shape in self.curve(filament)]
-        amplitude = np.array(parts)
-        if not (np.abs(amplitude) > 0.0).all():
-            raise FlagrsError(f"filament {filament} is straight at some time; it has no phase")
-        angle: FloatArray = np.angle(amplitude)
-        return angle
-
-    def phase_lag(self) -> FloatArray:
-        """Return the phase (T, F - 1) of the others beyond the first filament's, within half a turn [rad]."""
-        self._need(2, "a phase lag")
-        lag = self.phase[:, 1:] - self.phase[:, :1]
-        wrapped: FloatArray = (lag + np.pi) % (2.0 * np.pi) - np.pi
-        return wrapped
+        bent = np.linalg.norm(_curvature(rest), axis=1)
+        if len(bent) < LEAST_HINGES or float(bent.max()) * _length(rest) < 1e-6:
+            raise FlagrsError(f"filament {filament} is straight at rest; it has no phase")
+        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rest, axis=0), axis=1))])[1:-1]
+        smooth = bent <= 2.0 * np.median(bent)
+        least = np.eye(3)[int(np.abs(self.axis).argmin())]
+        y = np.cross(self.axis, least) / np.linalg.norm(np.cross(self.axis, least))
+        z = np.cross(self.axis, y)
+        vectors = _curvature(self.curve(filament))
+        across = (vectors @ y + 1j * (vectors @ z))[:, smooth]
+        shares = np.linspace(0.05, 0.95, PHASE_POINTS)
+        places = arc[smooth] / _length(rest)
+        return np.array([np.interp(shares, places, row) for row in across])
 
     def twist(self) -> FloatArray:
         """Return the twist (T, F) of every filament's material from base to tip, in turns [1].
@@ -197,45 +209,15 @@ def bundle_of(trajectory: Trajectory, frames: IntArray) -> Bundle:
     return Bundle(trajectory, frames, filaments)
 
 
-def _wave_number(rest: FloatArray) -> float | None:
-    """Return the wave number of a helix [1/m] by which its displacement across its line is best explained.
-
-    None where no helix explains half of it. Positive for right-handed ones.
-    """
-    line = rest[-1] - rest[0]
-    length = float(np.linalg.norm(line))
-    if length == 0.0:
-        return None
-    across = _across(rest, line / length)
-    total = float((np.abs(across) ** 2).mean())
-    if total <= 1e-12 * length**2:
-        return None
-    along = (rest - rest[0]) @ (line / length)
-    # Up to a wave for every four nodes, in steps that a finite helix resolves several times over.
-    largest = 2.0 * np.pi * len(rest) / (4.0 * length)
-    waves = np.linspace(-largest, largest, 32 * len(rest) + 1)
-    power = np.abs(np.exp(-1j * np.outer(waves, along)) @ across) / len(rest)
-    best = int(power.argmax())
-    if power[best] ** 2 < HELICAL * total or abs(waves[best]) * length < np.pi:
-        return None
-    return float(waves[best])
+def _curvature(shape: FloatArray) -> FloatArray:
+    """Return curvature vectors (..., n - 2, 3) at the inner nodes of a shape (..., n, 3) [1/m]."""
+    edges = np.diff(shape, axis=-2)
+    lengths = np.linalg.norm(edges, axis=-1, keepdims=True)
+    tangents = edges / lengths
+    mean = 0.5 * (lengths[..., 1:, :] + lengths[..., :-1, :])
+    vectors: FloatArray = np.diff(tangents, axis=-2) / mean
+    return vectors
 
 
-def _helix_part(shape: FloatArray, axis: FloatArray, wave: float) -> complex:
-    """Return the amplitude and phase of a helix of a wave number about an axis in a shape (n, 3)."""
-    along = (shape - shape[0]) @ axis
-    return complex((_across(shape, axis) * np.exp(-1j * wave * along)).mean())
-
-
-def _across(shape: FloatArray, axis: FloatArray) -> FloatArray:
-    """Return the displacement (n,) across an axis as complex numbers, less its straight part."""
-    least = np.eye(3)[int(np.abs(axis).argmin())]
-    y = np.cross(axis, least) / np.linalg.norm(np.cross(axis, least))
-    z = np.cross(axis, y)
-    across = shape @ y + 1j * (shape @ z)
-    along = shape @ axis
-    # A leaning filament: its line is not part of its helix.
-    basis = np.stack([np.ones_like(along), along - along.mean()], axis=1)
-    fitted = basis @ np.linalg.lstsq(basis, across, rcond=None)[0]
-    rest: FloatArray = across - fitted
-    return rest
+def _length(shape: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(shape, axis=0), axis=1).sum())

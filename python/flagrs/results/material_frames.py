@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,32 @@ def directors(
 ) -> FloatArray:
     """Return the material director m1 (F, E, 3) of the edges at some frames.
 
+    Parameters
+    ----------
+    scene, time, nodes, theta, state
+        As in `each_director`.
+    frames
+        Which frames (F,), in increasing order.
+    """
+    wanted = {int(frame): place for place, frame in enumerate(frames)}
+    found = np.zeros((len(frames), theta.shape[1], 3))
+    last = int(frames[-1]) + 1 if len(frames) else 0
+    for frame, director in enumerate(each_director(scene, time, nodes, theta, state, last)):
+        if frame in wanted:
+            found[wanted[frame]] = director
+    return found
+
+
+def each_director(
+    scene: Scene,
+    time: FloatArray,
+    nodes: FloatArray,
+    theta: FloatArray,
+    state: Mapping[str, Any] | None = None,
+    end: int | None = None,
+) -> Iterator[FloatArray]:
+    """Yield the material director m1 (E, 3) of the edges, frame by frame from the first.
+
     The simulation carries reference directors along with the tangents, from step to step, and saves the
     angles `theta` against them (docs/theory/rods.md). Here they are carried along cubic curves through the
     saved frames, which is another way, by some degrees a minute. With a checkpoint, which holds the
@@ -38,38 +65,34 @@ def directors(
         The scene, from whose initial shape the frames start.
     time, nodes, theta
         Instants (T,) [s], positions (T, N, 3) [m] and angles (T, E) [rad] of all frames.
-    frames
-        Which frames (F,), in increasing order.
     state
         The checkpoint.
+    end
+        How many frames; None: all.
     """
-    edges = edges_of(scene)
-    begin = _flagrs.Simulation(native_scene(scene), "overdamped", 1.0, 1).state()
-    reference, tangents = begin["directors"], begin["tangents"]
-    known = -1
+    known, drift = -1, np.zeros(theta.shape[1])
     if state is not None and "directors" in state:
         reached = float(np.ravel(state["time"])[0]) * (1.0 + 1e-12)
         known = int(np.searchsorted(time, reached, "right")) - 1
-    last = max(int(frames[-1]) if len(frames) else 0, known)
-    wanted = {int(frame): place for place, frame in enumerate(frames)}
-    carried, along = np.zeros((len(frames), len(edges), 3)), np.zeros((len(frames), len(edges), 3))
-    drift = np.zeros(len(edges))
-    for frame in range(min(last + 1, len(time))):
-        for shape in _between(time, nodes, frame) if frame else (nodes[0],):
-            after = _tangents(shape, edges)
-            reference = transported(reference, tangents, after)
-            tangents = after
-        if frame in wanted:
-            carried[wanted[frame]], along[wanted[frame]] = reference, tangents
-        if frame == known and state is not None:
+        for reference, tangents in islice(_carried(scene, time, nodes), known, known + 1):
             own = transported(state["directors"], state["tangents"], tangents)
             drift = angles_about(tangents, reference, own)
-    share = np.zeros(len(frames))
-    if known > 0:
-        share = (time[frames] - time[0]) / (time[known] - time[0])
-    angle = (theta[frames] + share[:, None] * drift)[..., None]
-    turned: FloatArray = np.cos(angle) * carried + np.sin(angle) * np.cross(along, carried)
-    return turned
+    for frame, (reference, tangents) in enumerate(islice(_carried(scene, time, nodes), end)):
+        share = (time[frame] - time[0]) / (time[known] - time[0]) if known > 0 else 0.0
+        angle = (theta[frame] + share * drift)[:, None]
+        yield np.cos(angle) * reference + np.sin(angle) * np.cross(tangents, reference)
+
+
+def _carried(scene: Scene, time: FloatArray, nodes: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield directors (E, 3) that never spin, from the initial shape on, and tangents, at each frame."""
+    edges = edges_of(scene)
+    begin = _flagrs.Simulation(native_scene(scene), "overdamped", 1.0, 1).state()
+    reference, tangents = begin["directors"], begin["tangents"]
+    for frame in range(len(time)):
+        for shape in _between(time, nodes, frame) if frame else (nodes[0],):
+            after = _tangents(shape, edges)
+            reference, tangents = transported(reference, tangents, after), after
+        yield reference, tangents
 
 
 def angles_about(axis: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:

@@ -205,7 +205,7 @@ def _bundle(trajectory: Trajectory, inside: IntArray, put: _Put) -> None:
         "phase_lag",
         "largest phase between two helices, mean over time",
         "rad",
-        lambda: _mean(np.abs(of(Bundle.phase_lag)).max(axis=1)),
+        lambda: _mean(_alike(of(Bundle.phase_lag)).max(axis=1)),
     )
     put("twist", "twist of a filament, mean, in turns", "1", lambda: _mean(of(Bundle.twist).mean(axis=1)))
     put("writhe", "writhe of a filament, mean", "1", lambda: _mean(of(Bundle.writhe).mean(axis=1)))
@@ -228,6 +228,14 @@ def _numbers(trajectory: Trajectory, put: _Put) -> None:
     put("reynolds", "Reynolds number of the fastest drive", "1", lambda: driven(scales.reynolds))
     put("sperm_number", "sperm number of the softest rod", "1", lambda: driven(scales.sperm_number))
     put("slenderness", "contour over radius of the stoutest rod", "1", lambda: _exact(scales.slenderness))
+
+
+def _alike(lags: FloatArray) -> FloatArray:
+    """Return the sizes of phase lags (T, K), if they mean something at all times."""
+    lost = int(np.isnan(lags).any(axis=1).sum())
+    if lost:
+        raise FlagrsError(f"in {lost} of {len(lags)} frames two filaments are too unlike to have a phase lag")
+    return np.abs(lags)
 
 
 def _exact(value: float) -> Estimate:

@@ -1,5 +1,6 @@
 """The description of what is simulated: frozen, validated parts in SI units, kept in TOML."""
 
+from flagrs.scene.body_shape import Capsule, Cylinder, Ellipsoid, Sphere
 from flagrs.scene.clamp import Clamp, Rotation
 from flagrs.scene.contact_model import Contact
 from flagrs.scene.flow import FlowFunction, LinearFlow, PoiseuilleFlow
@@ -16,8 +17,11 @@ from flagrs.scene.signal import Signal, Table, TimeFunction, signal_value
 from flagrs.scene.vector_signal import VectorSignal
 
 __all__ = [
+    "Capsule",
     "Clamp",
     "Contact",
+    "Cylinder",
+    "Ellipsoid",
     "FlowFunction",
     "Fluid",
     "Head",
@@ -33,6 +37,7 @@ __all__ = [
     "Rotation",
     "Scene",
     "Signal",
+    "Sphere",
     "Table",
     "TimeFunction",
     "VectorSignal",

@@ -9,7 +9,7 @@ use super::accuracy::gauss_rule;
 use super::close::Scratch;
 use super::octet::Four;
 use super::sources::{self, Source};
-use super::translation::Work;
+use super::translation::{Multipoles, Work};
 use super::{FarField, field, near, translation};
 
 /// Items of a cell below which its halves are not worth two threads.
@@ -90,9 +90,9 @@ impl FarField {
         }
         let far = self.interactions.far.of(cell);
         if !far.is_empty() {
-            let (places, given) = (&self.source_tree.places, &self.multipoles);
+            let all = Multipoles { places: &self.source_tree.places, multipoles: &self.multipoles };
             WORK.with_borrow_mut(|work| {
-                translation::to_local(path, &self.translation, work, place, far, places, given, own);
+                translation::to_local(path, &self.translation, work, place, far, &all, own);
             });
         }
         let carried = carried || !far.is_empty();

@@ -114,17 +114,20 @@ on_path! {
     ) = to_children_as
 }
 
+/// All cells with sources: where they are, and their multipoles, one expansion after the other.
+pub(crate) struct Multipoles<'a> {
+    pub(crate) places: &'a [Place],
+    pub(crate) multipoles: &'a [Four],
+}
+
 on_path! {
     /// Adds what the multipoles of the cells listed bring to a local expansion, each up to its order.
-    ///
-    /// `places` and `multipoles` hold all cells, one expansion after the other.
     pub(crate) fn to_local(
         tables: &Translation,
         work: &mut Work,
         target: &Place,
         sources: &[FarCell],
-        places: &[Place],
-        multipoles: &[Four],
+        all: &Multipoles<'_>,
         out: &mut [Four],
     ) = to_local_as
 }
@@ -216,8 +219,7 @@ fn to_local_as<L: Lanes>(
     work: &mut Work,
     target: &Place,
     sources: &[FarCell],
-    places: &[Place],
-    multipoles: &[Four],
+    &Multipoles { places, multipoles }: &Multipoles<'_>,
     out: &mut [Four],
 ) {
     let count = tables.count();
