@@ -3,10 +3,8 @@
 //! Every case is a simulation of its own with one thread: it goes the same way, to the last bit, whatever the others do and however many
 //! threads there are.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::inputs::Inputs;
 use crate::model::{Model, ModelError};
@@ -79,7 +77,7 @@ impl From<StepError> for CaseError {
     }
 }
 
-/// Takes all cases forward, in their order; `stop` ends every one within its present step.
+/// Takes all cases forward; `stop` ends every one within its present step. The outcomes are in the order of the cases.
 pub fn rollout(
     model: &Arc<Model>,
     cases: Vec<Case>,
@@ -87,30 +85,74 @@ pub fn rollout(
     threads: Threads,
     stop: &Arc<AtomicBool>,
 ) -> Vec<Result<Outcome, CaseError>> {
-    let one = |case: Case| run(model, case, plan, stop);
+    let count = cases.len();
+    let work = Work { model, plan, stop, cases: cases.into_iter().map(|case| Mutex::new(Some(case))).collect() };
+    let outcomes: Vec<Mutex<Option<_>>> = (0..count).map(|_| Mutex::new(None)).collect();
+    let next = AtomicUsize::new(0);
+    // Whoever is free takes the next case; a thread keeps its workspace from case to case.
+    let worker = || {
+        let mut workspace = None;
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let (Some(case), Some(outcome)) = (work.take(number), outcomes.get(number)) else { break };
+            *outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(work.run(&mut workspace, case));
+        }
+    };
     match threads.pool() {
-        Some(pool) => pool.install(|| cases.into_par_iter().with_max_len(1).map(one).collect()),
-        None => cases.into_iter().map(one).collect(),
+        Some(pool) => pool.scope(|scope| (0..threads.0.min(count)).for_each(|_| scope.spawn(|_| worker()))),
+        None => worker(),
     }
+    let outcomes = outcomes.into_iter().map(|outcome| outcome.into_inner().unwrap_or_else(PoisonError::into_inner));
+    outcomes.map(|outcome| outcome.unwrap_or(Err(CaseError::from(StepError::Interrupted)))).collect()
 }
 
-fn run(model: &Arc<Model>, case: Case, plan: &Plan, stop: &Arc<AtomicBool>) -> Result<Outcome, CaseError> {
-    let Case { state, inputs, changed } = case;
-    let mut simulation = Simulation::from_model(Arc::clone(model), inputs, state, plan.scheme, plan.dt, 1)?;
-    if let Some(inputs) = changed {
-        simulation.set_inputs(inputs);
+/// What all threads share.
+struct Work<'a> {
+    model: &'a Arc<Model>,
+    plan: &'a Plan,
+    stop: &'a Arc<AtomicBool>,
+    cases: Vec<Mutex<Option<Case>>>,
+}
+
+impl Work<'_> {
+    fn take(&self, number: usize) -> Option<Case> {
+        self.cases.get(number)?.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
-    simulation.set_tolerance(plan.tolerance);
-    let asked = Arc::clone(stop);
-    simulation.set_interrupt(Some(Box::new(move || asked.load(Ordering::Relaxed))));
-    let frames = match &plan.extent {
-        Extent::Steps(count) => {
-            (0..*count).try_for_each(|_| simulation.step())?;
-            vec![simulation.frame()?]
+
+    /// Takes one case forward in the workspace of a thread; one in which a case failed is not used again.
+    fn run(&self, workspace: &mut Option<Simulation>, case: Case) -> Result<Outcome, CaseError> {
+        let Case { state, inputs, changed } = case;
+        let mut simulation = match workspace.take() {
+            Some(mut simulation) => {
+                simulation.set_inputs(inputs);
+                simulation.adopt(state)?;
+                simulation
+            }
+            None => self.workspace(inputs, state)?,
+        };
+        if let Some(inputs) = changed {
+            simulation.set_inputs(inputs);
         }
-        Extent::Times(times) => frames(&mut simulation, times, plan)?,
-    };
-    Ok(Outcome { frames, state: simulation.state().clone() })
+        let frames = match &self.plan.extent {
+            Extent::Steps(count) => {
+                (0..*count).try_for_each(|_| simulation.step())?;
+                vec![simulation.frame()?]
+            }
+            Extent::Times(times) => frames(&mut simulation, times, self.plan)?,
+        };
+        let state = simulation.state().clone();
+        *workspace = Some(simulation);
+        Ok(Outcome { frames, state })
+    }
+
+    fn workspace(&self, inputs: Inputs, state: State) -> Result<Simulation, CaseError> {
+        let Plan { scheme, dt, tolerance, .. } = *self.plan;
+        let mut simulation = Simulation::from_model(Arc::clone(self.model), inputs, state, scheme, dt, 1)?;
+        simulation.set_tolerance(tolerance);
+        let stop = Arc::clone(self.stop);
+        simulation.set_interrupt(Some(Box::new(move || stop.load(Ordering::Relaxed))));
+        Ok(simulation)
+    }
 }
 
 fn frames(simulation: &mut Simulation, times: &[f64], plan: &Plan) -> Result<Vec<Frame>, CaseError> {
