@@ -11,10 +11,11 @@ use flagrs::elastic::hinges::Hinges;
 use flagrs::elastic::stretching::Stretching;
 use flagrs::elastic::twisting::Twisting;
 use flagrs::linear::pattern::Pattern;
-use flagrs::rod::assembly::{Assembly, HingeElement, Increment, Term};
+use flagrs::rod::assembly::{Assembly, HingeElement};
 use flagrs::rod::configuration::Configuration;
 use flagrs::rod::network::Network;
 use flagrs::rod::reference::ReferenceFrames;
+use flagrs::rod::term::{Conservative, Term};
 use flagrs::simulation::Simulation;
 use flagrs::step::scheme::Scheme;
 
@@ -74,20 +75,13 @@ impl Chain {
 
     fn energy(&mut self) -> f64 {
         self.place();
-        self.stretching.energy(&self.configuration) + self.hinges.energy(&self.configuration)
+        self.stretching.energy(&self.configuration)
+            + self.hinges.bending_energy(&self.configuration)
+            + self.hinges.twisting_energy(&self.configuration)
     }
 
     fn derive(&mut self, with_hessian: bool) {
         self.place();
-        let increment = Increment {
-            rate: 1.0,
-            previous: &self.q,
-            drift: &self.q,
-            velocity: &self.q,
-            velocity_drift: &self.q,
-            inputs: &[],
-            background: None,
-        };
         self.gradient.fill(0.0);
         let mut jacobian = None;
         if with_hessian {
@@ -95,8 +89,8 @@ impl Chain {
             jacobian = Some(self.hessian.as_mut_slice());
         }
         let mut out = Assembly { residual: &mut self.gradient, jacobian };
-        self.stretching.add(&self.configuration, &increment, &mut out);
-        self.hinges.add(&self.configuration, &increment, &mut out);
+        self.stretching.add(&self.configuration, 0.0, &mut out).expect("edges have lengths");
+        self.hinges.add(&self.configuration, 0.0, &mut out).expect("no hinge is folded");
     }
 }
 
@@ -118,7 +112,7 @@ fn elasticity(criterion: &mut Criterion) {
     for nodes in [59, 136, 1000] {
         let mut simulation_moved = simulation(nodes, true);
         let mut chain = Chain::of(&simulation_moved, nodes);
-        let (gradient, hessian) = simulation_moved.elastic_derivatives();
+        let (gradient, hessian) = simulation_moved.elastic_derivatives().expect("a configuration");
         chain.derive(true);
         assert!(chain.gradient == gradient, "the bench evaluates the terms of a simulation");
         // A simulation's pattern has more entries, those of the other terms; the sum of all does not see them.

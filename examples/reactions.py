@@ -13,7 +13,7 @@ reaction = trajectory.reaction(
 )  # of the first clamp: force (T, 3), torque (T, 3) about its first node, power (T,)
 
 held, thrust = reaction.force[-1, 0], trajectory.thrust()[-1, 0]
-print(f"along its axis the clamp holds {1e3 * held:.3f} mN, and the fluid is pushed with {1e3 * thrust:.3f} mN")
+print(f"along its axis the clamp holds {1e3 * held:.3f} mN, and pushes the fluid with {1e3 * thrust:.3f} mN")
 print(f"it turns with {1e6 * reaction.torque[-1, 0]:.1f} uN m, and spends {1e6 * reaction.power[-1]:.1f} uW")
 spent = trajectory.powers()
 print(f"of which the fluid takes {1e6 * (spent['fluid'] + spent['twist_drag'])[-1]:.1f} uW")

@@ -6,10 +6,11 @@ use common::{Random, chain_edges, chain_hinges};
 use flagrs::Vec3;
 use flagrs::fluid::head::Head;
 use flagrs::linear::pattern::Pattern;
-use flagrs::rod::assembly::{Assembly, Increment, Term};
+use flagrs::rod::assembly::{Assembly, Increment};
 use flagrs::rod::configuration::{Configuration, node};
 use flagrs::rod::network::Network;
 use flagrs::rod::reference::ReferenceFrames;
+use flagrs::rod::term::{External, Term};
 
 const TRANSLATION: f64 = 1.7;
 const ROTATION: f64 = 0.6;
@@ -48,13 +49,24 @@ impl Setting {
     fn evaluate(&self, q: &[f64], rate: f64, previous: &[f64], drift: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut configuration = Configuration::new(&self.network, q.len());
         assert!(configuration.update(&self.network, q, &self.frames, &[]));
-        let increment =
-            Increment { rate, previous, drift, velocity: drift, velocity_drift: drift, inputs: &[], background: None };
+        let increment = Increment {
+            time: 0.0,
+            rate,
+            previous,
+            drift,
+            velocity: drift,
+            velocity_drift: drift,
+            inputs: &[],
+            motor_torques: &[],
+            background: None,
+        };
         let (mut residual, mut jacobian) = (vec![0.0; q.len()], vec![0.0; self.pattern.entries()]);
         let mut out = Assembly { residual: &mut residual, jacobian: Some(&mut jacobian) };
-        self.head.add(&configuration, &increment, &mut out);
+        self.head.add(&configuration, &increment, &mut out).expect("the head resists");
         let mut alone = vec![0.0; q.len()];
-        self.head.add(&configuration, &increment, &mut Assembly { residual: &mut alone, jacobian: None });
+        self.head
+            .add(&configuration, &increment, &mut Assembly { residual: &mut alone, jacobian: None })
+            .expect("the head resists");
         assert_eq!(residual, alone, "the residual depends on whether the derivative is asked for");
         (residual, jacobian)
     }

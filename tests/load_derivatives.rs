@@ -9,10 +9,11 @@ use flagrs::forces::follower::{FollowerForce, FollowerTorque};
 use flagrs::forces::laboratory::{EdgeTorque, NodeForce};
 use flagrs::forces::magnetic::Magnetism;
 use flagrs::linear::pattern::Pattern;
-use flagrs::rod::assembly::{Assembly, Increment, Term};
+use flagrs::rod::assembly::{Assembly, Increment};
 use flagrs::rod::configuration::Configuration;
 use flagrs::rod::network::Network;
 use flagrs::rod::reference::ReferenceFrames;
+use flagrs::rod::term::External;
 use flagrs::{Mat3, Vec3};
 
 /// Two edges, frames of a reference shape, and degrees of freedom away from it.
@@ -48,19 +49,22 @@ impl Case {
         configuration
     }
 
-    fn evaluate(&self, term: &dyn Term, q: &[f64], jacobian: Option<&mut [f64]>) -> Vec<f64> {
+    fn evaluate(&self, term: &dyn External, q: &[f64], jacobian: Option<&mut [f64]>) -> Vec<f64> {
         let zero = vec![0.0; q.len()];
         let increment = Increment {
+            time: 0.0,
             rate: 1.0,
             previous: &zero,
             drift: &zero,
             velocity: &zero,
             velocity_drift: &zero,
             inputs: &self.inputs,
+            motor_torques: &[],
             background: None,
         };
         let mut residual = vec![0.0; q.len()];
-        term.add(&self.configuration(q), &increment, &mut Assembly { residual: &mut residual, jacobian });
+        term.add(&self.configuration(q), &increment, &mut Assembly { residual: &mut residual, jacobian })
+            .expect("there is a force");
         residual
     }
 }
@@ -77,7 +81,7 @@ fn difference(q: &[f64], dof: usize, value: &dyn Fn(&[f64]) -> Vec<f64>) -> Vec<
     (0..a.len()).map(|k| (4.0 * (c[k] - d[k]) / h - (a[k] - b[k]) / (2.0 * h)) / 3.0).collect()
 }
 
-fn check_derivative(case: &Case, term: &mut dyn Term) {
+fn check_derivative(case: &Case, term: &mut dyn External) {
     let stencils = term.stencils();
     let pattern = Pattern::from_stencils(case.q.len(), stencils.iter().map(Vec::as_slice));
     term.bind(&pattern);
@@ -93,7 +97,7 @@ fn check_derivative(case: &Case, term: &mut dyn Term) {
     }
 }
 
-fn terms(network: &Network) -> Vec<Box<dyn Term>> {
+fn terms(network: &Network) -> Vec<Box<dyn External>> {
     let channels = Case::channels();
     let gradient = Mat3::new(0.3, 0.2, -0.5, 0.2, 0.4, 0.1, -0.5, 0.1, -0.7);
     let moments = vec![(0, Vec3::new(0.5, -0.3, 0.8)), (1, Vec3::new(-0.2, 0.6, 0.4))];

@@ -9,9 +9,10 @@ use flagrs::forces::inertia::Inertia;
 use flagrs::forces::weight::Weight;
 use flagrs::linear::pattern::Pattern;
 use flagrs::model::Model;
-use flagrs::rod::assembly::{Assembly, Increment, Term};
+use flagrs::rod::assembly::{Assembly, Increment};
 use flagrs::rod::configuration::{Configuration, node};
 use flagrs::rod::network::Network;
+use flagrs::rod::term::External;
 use flagrs::state::State;
 
 const NODES: usize = 5;
@@ -41,12 +42,14 @@ impl Step {
 
     fn increment(&self) -> Increment<'_> {
         Increment {
+            time: 0.0,
             rate: 3.0,
             previous: &self.before,
             drift: &self.drift,
             velocity: &self.velocity,
             velocity_drift: &self.drift,
             inputs: &[],
+            motor_torques: &[],
             background: None,
         }
     }
@@ -57,15 +60,15 @@ impl Step {
         configuration
     }
 
-    fn residual(&self, term: &dyn Term, q: &[f64]) -> Vec<f64> {
+    fn residual(&self, term: &dyn External, q: &[f64]) -> Vec<f64> {
         let mut residual = vec![0.0; q.len()];
         let mut out = Assembly { residual: &mut residual, jacobian: None };
-        term.add(&self.configuration(q), &self.increment(), &mut out);
+        term.add(&self.configuration(q), &self.increment(), &mut out).expect("there is a force");
         residual
     }
 
     /// Column-major dense derivative as the term hands it in, and the residual beside it.
-    fn derivative(&self, term: &mut dyn Term) -> (Vec<f64>, Vec<f64>) {
+    fn derivative(&self, term: &mut dyn External) -> (Vec<f64>, Vec<f64>) {
         let size = self.after.len();
         let diagonal: Vec<Vec<usize>> = (0..size).map(|dof| vec![dof]).collect();
         let stencils = term.stencils();
@@ -74,7 +77,7 @@ impl Step {
         term.bind(&pattern);
         let (mut residual, mut values) = (vec![0.0; size], vec![0.0; pattern.entries()]);
         let mut out = Assembly { residual: &mut residual, jacobian: Some(&mut values) };
-        term.add(&self.configuration(&self.after), &self.increment(), &mut out);
+        term.add(&self.configuration(&self.after), &self.increment(), &mut out).expect("there is a force");
         let mut dense = vec![0.0; size * size];
         for column in 0..size {
             for slot in pattern.column_starts()[column]..pattern.column_starts()[column + 1] {
@@ -85,7 +88,7 @@ impl Step {
     }
 
     /// Central difference of the residual by a degree of freedom.
-    fn difference(&self, term: &dyn Term, dof: usize) -> Vec<f64> {
+    fn difference(&self, term: &dyn External, dof: usize) -> Vec<f64> {
         let h = 1e-5;
         let at = |shift: f64| {
             let mut q = self.after.clone();

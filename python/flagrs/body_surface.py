@@ -11,7 +11,7 @@ from flagrs.scene.body_shape import BodyShape
 from flagrs.scene.shapes import number
 from flagrs.scene.values import Array, Bounds, FloatArray
 
-_ACCURACY = Bounds("1", at_least=1e-8, at_most=0.1)
+_ACCURACY = Bounds("1", at_least=1e-6, at_most=0.1)
 _VISCOSITY = Bounds("Pa s", above=0.0)
 
 
@@ -26,7 +26,7 @@ class BodySurface:
     shape
         `flagrs.Sphere`, `flagrs.Ellipsoid`, `flagrs.Capsule` or `flagrs.Cylinder`.
     accuracy
-        Largest error of the resistance, relative to itself: 1e-8 to 0.1.
+        Largest error of the resistance, relative to itself: 1e-6 to 0.1.
 
     Raises
     ------

@@ -16,6 +16,7 @@ from flagrs import scenarios
 from flagrs.commands.export import export
 from flagrs.commands.measure import measure
 from flagrs.commands.movie import movie
+from flagrs.commands.new import new, schema
 from flagrs.commands.plot import check_image, draw, plot
 from flagrs.commands.view import view
 from flagrs.errors import FlagrsError, SceneError
@@ -23,10 +24,13 @@ from flagrs.progress import ProgressBar
 from flagrs.runs import Run, RunSettings, measured, run_to_file
 from flagrs.scene import Scene, toml
 from flagrs.step_choice import steps_in_words
-from flagrs.suggest import suggest
+from flagrs.suggestion import suggest
 from flagrs.trajectory import Trajectory
 from flagrs.units import rpm
 from flagrs.version import installed_version
+
+#: Clamps that the report of a run tells of.
+MOST_CLAMPS = 4
 
 app = typer.Typer(
     help="Soft helical filaments swimming at low Reynolds number.",
@@ -36,7 +40,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # it takes units in brackets for markup
 )
 
-for command in (plot, view, movie, measure, export):
+for command in (plot, view, movie, measure, export, new, schema):
     app.command()(command)
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
@@ -259,6 +263,7 @@ def _report(done: Run, path: Path) -> str:
         lines.append(f"head rate         {values['head_rate'] / rpm(1.0):.4g} rpm")
     if values["efficiency"] is not None:
         lines.append(f"efficiency        {100 * values['efficiency']:.3g} %")
+    lines += _clamps(trajectory)
     wall = trajectory.wall_seconds
     factor = f", {simulated / wall:.3g} times real time" if wall > 0.0 else ""
     lines.append(f"wall time         {wall:.3g} s for {simulated:g} s simulated{factor}")
@@ -266,6 +271,20 @@ def _report(done: Run, path: Path) -> str:
     lines.append(f"steps             {steps_in_words(steps, given)}")
     lines.append(f"saved             {path} ({len(trajectory)} frames)")
     return "\n".join(lines)
+
+
+def _clamps(trajectory: Trajectory) -> list[str]:
+    """Return a line for each of the first clamps: its mean force and torque over the last half of the run."""
+    lines = []
+    later = slice(len(trajectory) // 2, None)
+    for clamp in range(min(MOST_CLAMPS, len(trajectory.scene.clamps)) if len(trajectory) else 0):
+        try:
+            force, torque, _ = trajectory.reaction(clamp)
+        except FlagrsError:  # a file of before reactions were recorded
+            return []
+        held, turned = (", ".join(f"{x:.3g}" for x in part[later].mean(axis=0)) for part in (force, torque))
+        lines.append(f"clamp {clamp:<12}({held}) N, ({turned}) N m on average")
+    return lines
 
 
 def _say_what_is_saved(path: Path) -> None:

@@ -105,9 +105,9 @@ class ReadOuts:
         return self._native.terms
 
     def energy(self) -> Mapping[str, float]:
-        """Return the elastic energies [J]: stretching, bending, twisting and their total."""
+        """Return the elastic energies [J] by name: stretching, bending, twisting and their total."""
         parts = self._native.energies()
-        return dict(zip(("stretching", "bending", "twisting"), parts, strict=True)) | {"total": sum(parts)}
+        return parts | {"total": sum(parts.values())}
 
     def gradient(self) -> FloatArray:
         """Return the gradient (ndof,) of the elastic energy [N, N m].

@@ -177,13 +177,13 @@ class Network:
             "bending": native["bending"] * np.where(hinges, 1.0, soft)[:, None, None],
             "twisting": native["twisting"] * np.where(hinges, 1.0, soft),
         }
-        return float(sum(_flagrs.Simulation({**native, **own}, "implicit", 1.0, 1).energies()))
+        return float(sum(_flagrs.Simulation({**native, **own}, "implicit", 1.0, 1).energies().values()))
 
     @cached_property
     def stressed(self) -> bool:
         """Whether anything is strained at the start, beyond round-off."""
         stretched = 0.5 * float((self._native["stretching"] * self.lengths).sum())
-        return float(sum(self._start.energies())) > 1e-20 * stretched
+        return float(sum(self._start.energies().values())) > 1e-20 * stretched
 
     @cached_property
     def _start(self) -> _flagrs.Simulation:

@@ -7,22 +7,23 @@ import math
 import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
 from flagrs import trajectory_file
 from flagrs.assemble import edges_of
-from flagrs.budget import EnergyBudget, budget_of, powers_of
+from flagrs.budget import EnergyBudget, budget_of
 from flagrs.errors import FileError, FlagrsError
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.fluid import hat_weights
 from flagrs.force_density import ForceDensity
 from flagrs.frame import shapes_of
 from flagrs.guards import Notice, StationarityWarning, notices
+from flagrs.lazy_frames import LazyField
 from flagrs.measures import along, angle_about, slope, spin_about, window
-from flagrs.reactions import Reaction, reaction_of
 from flagrs.results.bundle import Bundle, bundle_of
+from flagrs.results.drivers import DriverReadOuts
 from flagrs.results.material_frames import directors, each_director
 from flagrs.results.readouts import ReadOuts, readouts_of
 from flagrs.results.swimming import Swimming, swimming_of
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from flagrs.view import View
 
 
-class Trajectory:
+class Trajectory(DriverReadOuts):
     """The frames of a run, in SI units.
 
     With T frames, N nodes, E edges and M motors, in the scene's numbering:
@@ -59,8 +60,6 @@ class Trajectory:
     clamp_force, clamp_torque, clamp_power : ndarray
         Forces (T, C, 3) [N], torques about their first nodes (T, C, 3) [N m] and powers (T, C) [W] of the C
         clamps; see `reaction`.
-    contacts : ndarray
-        Number of touching pairs of edges (T,).
     account : ndarray
         What `energy_budget` and `warnings` read (T, 42).
     energy : ndarray
@@ -84,14 +83,13 @@ class Trajectory:
         self.nodes = frames["nodes"]
         self.theta = frames["theta"]
         self.velocities = frames["velocities"]
-        self.force_density = ForceDensity(frames["force_density"], immersed_edges(scene)[0])
+        self.force_density = _known_by_edges(frames["force_density"], immersed_edges(scene)[0])
         self.motor_angle = frames["motor_angle"]
         self.motor_speed = frames["motor_speed"]
         self.motor_torque = frames["motor_torque"]
         self.clamp_force = frames["clamp_force"]
         self.clamp_torque = frames["clamp_torque"]
         self.clamp_power = frames["clamp_power"]
-        self.contacts = frames["contacts"].astype(np.int64)
         self.energy = frames["energy"]
         self.account = frames["account"]
         self.scene = scene
@@ -101,10 +99,18 @@ class Trajectory:
         self.wall_seconds = contents.wall_seconds
 
     @classmethod
-    def load(cls, path: str | Path) -> Self:
+    def load(cls, path: str | Path, lazy: bool | None = None) -> Self:
         """Return the trajectory in a file, whether its run finished, goes on, or was killed.
 
         Signals that were Python functions come back as tables of their values at the frames.
+
+        Parameters
+        ----------
+        path
+            The file.
+        lazy
+            Whether frames stay in the file until they are asked for, each checked as it is read: then a file
+            of any size opens at once. None: from 256 MB on.
 
         Raises
         ------
@@ -112,7 +118,7 @@ class Trajectory:
             If the file is missing, cannot be read, has changed since it was written, or is no trajectory; an
             `OSError`.
         """
-        contents = trajectory_file.read(Path(path))
+        contents = trajectory_file.read_as(Path(path), lazy)
         try:
             scene = recorded_scene(contents)
             trajectory = cls(contents, scene, Path(path))
@@ -141,6 +147,11 @@ class Trajectory:
         trajectory_file.write_whole(Path(path), self._contents, overwrite)
 
     @property
+    def contacts(self) -> IntArray:
+        """Number of touching pairs of edges (T,)."""
+        return np.asarray(self._contents.frames["contacts"]).astype(np.int64)
+
+    @property
     def has_checkpoint(self) -> bool:
         """Whether the run can be gone on with; see `flagrs.Simulation.restore`."""
         return self._contents.state is not None
@@ -153,6 +164,12 @@ class Trajectory:
         """Return a one-line summary."""
         until = f", 0 to {self.time[-1]:g} s" if len(self) else ""
         return f"Trajectory({self.scene.name}: {len(self)} frames of {self.nodes.shape[1]} nodes{until})"
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        from flagrs.notebook import trajectory_html  # it reads trajectories, so it is above this module
+
+        return trajectory_html(self)
 
     def swimming_speed(self, start: float | None = None, end: float | None = None) -> float:
         """Return the speed of the head node, or of the mean of all nodes in a scene without a head [m/s].
@@ -253,29 +270,6 @@ class Trajectory:
         total: FloatArray = (self.motor_torque * self.motor_speed).sum(axis=1)
         return total
 
-    def reaction(self, clamp: int = 0) -> Reaction:
-        """Return force (T, 3), torque (T, 3) and power (T,) of a clamp on its filament [N, N m, W].
-
-        The torque is about the clamp's first node. A clamp that holds a swimmer, turned by it or by motors,
-        feels the opposite: its thrust.
-
-        Raises
-        ------
-        SceneError
-            If there is no such clamp.
-        FlagrsError
-            If the file was written before reactions were recorded.
-        """
-        return reaction_of(clamp, self.clamp_force, self.clamp_torque, self.clamp_power)
-
-    def powers(self) -> dict[str, FloatArray]:
-        """Return the power (T,) through every channel of the energy budget, given or taken [W].
-
-        ``motors``, ``clamps``, ``loads`` and ``gravity`` give; ``fluid``, ``twist_drag``, ``head``,
-        ``contact`` and ``other`` take. A frame between adaptive steps has those of the step's end.
-        """
-        return powers_of(self.account)
-
     def mean_power(self, start: float | None = None, end: float | None = None) -> float:
         """Return the mean power of all motors together in a window, by default the last half of the run [W].
 
@@ -322,7 +316,7 @@ class Trajectory:
 
     def energy_budget(self) -> EnergyBudget:
         """Return the energy given, taken and stored since the start, frame by frame, and the defect."""
-        return budget_of(self.account)
+        return budget_of(np.asarray(self.account))
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
@@ -353,7 +347,7 @@ class Trajectory:
 
     def minimum_gap(self) -> FloatArray:
         """Return the smallest gap (T,) between colliding edges, surface to surface, or infinity [m]."""
-        return self._contents.frames["minimum_gap"]
+        return np.asarray(self._contents.frames["minimum_gap"])
 
     def rod_nodes(self, rod: int) -> FloatArray:
         """Return the positions (T, n, 3) of the nodes of one rod [m]."""
@@ -479,6 +473,14 @@ class Trajectory:
 
     def _global_node(self, part: Head | Motor, node: int) -> int:
         return self.scene.node_offset(part.rod) + node
+
+
+def _known_by_edges(density: FloatArray, edges: IntArray) -> FloatArray:
+    """Return a force density (T, N, 3), in memory or in a file, that knows the edges it lives on."""
+    if isinstance(density, LazyField):
+        lazy: Any = density.marked_by(lambda values: ForceDensity(values, edges))
+        return cast(FloatArray, lazy)
+    return ForceDensity(density, edges)
 
 
 def trajectory_from(contents: Contents, path: Path | None) -> Trajectory:

@@ -169,7 +169,7 @@ def load(path: str) -> Raw:
         If anything is not as flagrs writes it.
     """
     try:
-        with _open(path) as file:
+        with opened(path) as file:
             return _contents(file, os.path.getsize(path))
     except (OSError, KeyError, TypeError, ValueError, RuntimeError, AttributeError, MemoryError) as error:
         raise Damaged(f"damaged, or not a flagrs trajectory ({_words(error)})") from None
@@ -179,30 +179,76 @@ def _words(error: BaseException) -> str:
     return " ".join(str(error).split())[:200] or type(error).__name__
 
 
-def _open(path: str) -> h5py.File:
+def opened(path: str) -> h5py.File:
+    """Return an open file, also of a run that goes on or was killed.
+
+    Raises
+    ------
+    Damaged
+        If HDF5 cannot open it.
+    """
     try:
-        return h5py.File(path, "r", locking=False)
-    except OSError:
-        # The mark of an open writer is still set: it is running, or was killed. SWMR reads both.
-        return h5py.File(path, "r", libver="latest", swmr=True, locking=False)
+        try:
+            return h5py.File(path, "r", locking=False)
+        except OSError:
+            # The mark of an open writer is still set: it is running, or was killed. SWMR reads both.
+            return h5py.File(path, "r", libver="latest", swmr=True, locking=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise Damaged(f"damaged, or not a flagrs trajectory ({_words(error)})") from None
+
+
+def outline(file: h5py.File, size: int) -> Raw | None:
+    """Return everything an open file holds but its frames, which stay in it, after checking all that is read.
+
+    Returns
+    -------
+    dict or None
+        As `load`, with datasets for ``frames``, ``sums`` (T,) and the arrays ``time`` and ``signals``; None
+        for a file whose frames must all be read to know how many are whole: one without checksums, or whose
+        process died while it noted them.
+
+    Raises
+    ------
+    Damaged
+        If anything is not as flagrs writes it.
+    """
+    try:
+        version, manifest, names, count, wall, finished = _header(file, size)
+        if version < 2 or int(_number(file, "progress_sum", size)) != progress_sum(count, wall, finished):
+            return None
+        frames = {name: _frames(file, f"frames/{name}", size) for name in names["frames"]}
+        signals = {name: _frames(file, f"signals/{name}", size) for name in names["signals"]}
+        sums = _numbers(file, "sums", "u8", size)
+        if count < 0 or any(len(data) < count for data in [sums, *frames.values(), *signals.values()]):
+            raise Damaged(f"damaged: {count} frames are not all there")
+        time = frames["time"][:count]
+        if not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+            raise Damaged("damaged: times of frames that do not rise")
+        state, state_frames = _newest_slot(file, version, count, size)
+    except (OSError, KeyError, TypeError, ValueError, RuntimeError, AttributeError, MemoryError) as error:
+        raise Damaged(f"damaged, or not a flagrs trajectory ({_words(error)})") from None
+    return {
+        "manifest": manifest,
+        "frames": frames,
+        "time": time,
+        "sums": sums[:count],
+        "signals": signals,
+        "state": state,
+        "state_frames": state_frames,
+        "finished": finished,
+        "wall_seconds": wall,
+    }
+
+
+def _frames(file: h5py.File, name: str, size: int) -> h5py.Dataset:
+    """Return a field's dataset, which claims no more bytes than the file has."""
+    dataset = _dataset(file, name)
+    _check_claim(dataset, name, "f8", size)
+    return dataset
 
 
 def _contents(file: h5py.File, size: int) -> Raw:
-    if _attribute(file, "format") != FORMAT:
-        raise Damaged("not a flagrs trajectory")
-    version = int(_attribute(file, "format_version"))
-    manifest = {name: _text(file, f"manifest/{name}") for name in _names(file, "manifest")}
-    missing = set(_MANIFEST) - manifest.keys()
-    if missing:
-        raise Damaged(f"damaged: no {', '.join(sorted(missing))}")
-    if version > FORMAT_VERSION:
-        raise Damaged(f"written by a newer flagrs, {manifest['version'][:40]}")
-    # The count first: what a running simulation adds while the rest is read lies beyond it.
-    count = int(_number(file, "count", size))
-    wall, finished = float(_number(file, "wall_seconds", size)), bool(_number(file, "finished", size))
-    names = {group: _names(file, group) for group in ("frames", "signals")}
-    if version > 1 and _text(file, "manifest_sum") != manifest_sum(manifest, names):
-        raise Damaged("changed since it was written: the manifest's checksum does not match")
+    version, manifest, names, count, wall, finished = _header(file, size)
     frames = {name: _numbers(file, f"frames/{name}", "f8", size) for name in names["frames"]}
     signals = {name: _numbers(file, f"signals/{name}", "f8", size) for name in names["signals"]}
     if version > 1:
@@ -230,6 +276,29 @@ def _contents(file: h5py.File, size: int) -> Raw:
         "finished": finished,
         "wall_seconds": wall,
     }
+
+
+_Header = tuple[int, dict[str, str], dict[str, list[str]], int, float, bool]
+
+
+def _header(file: h5py.File, size: int) -> _Header:
+    """Return version, manifest, names of datasets, number of frames, wall time, and whether finished."""
+    if _attribute(file, "format") != FORMAT:
+        raise Damaged("not a flagrs trajectory")
+    version = int(_attribute(file, "format_version"))
+    manifest = {name: _text(file, f"manifest/{name}") for name in _names(file, "manifest")}
+    missing = set(_MANIFEST) - manifest.keys()
+    if missing:
+        raise Damaged(f"damaged: no {', '.join(sorted(missing))}")
+    if version > FORMAT_VERSION:
+        raise Damaged(f"written by a newer flagrs, {manifest['version'][:40]}")
+    # The count first: what a running simulation adds while the rest is read lies beyond it.
+    count = int(_number(file, "count", size))
+    wall, finished = float(_number(file, "wall_seconds", size)), bool(_number(file, "finished", size))
+    names = {group: _names(file, group) for group in ("frames", "signals")}
+    if version > 1 and _text(file, "manifest_sum") != manifest_sum(manifest, names):
+        raise Damaged("changed since it was written: the manifest's checksum does not match")
+    return version, manifest, names, count, wall, finished
 
 
 def _newest_slot(file: h5py.File, version: int, count: int, size: int) -> tuple[bytes | None, int]:
@@ -299,6 +368,13 @@ def _text(file: h5py.File, name: str) -> str:
 
 def _numbers(file: h5py.File, name: str, kind: str, size: int) -> npt.NDArray[Any]:
     dataset = _dataset(file, name)
+    _check_claim(dataset, name, kind, size)
+    values: npt.NDArray[Any] = dataset[()]
+    return values
+
+
+def _check_claim(dataset: h5py.Dataset, name: str, kind: str, size: int) -> None:
+    """Raise Damaged unless a dataset holds numbers of a kind, and no more than its file has room for."""
     if dataset.dtype != np.dtype(kind):
         raise Damaged(f"damaged: {name} holds {dataset.dtype}")
     claimed = dataset.dtype.itemsize
@@ -306,8 +382,6 @@ def _numbers(file: h5py.File, name: str, kind: str, size: int) -> npt.NDArray[An
         claimed *= int(length)
     if claimed > size:
         raise Damaged(f"damaged: {name} claims {claimed} bytes in a file of {size}")
-    values: npt.NDArray[Any] = dataset[()]
-    return values
 
 
 def _number(file: h5py.File, name: str, size: int) -> Any:
@@ -322,15 +396,19 @@ _LOOK_MEMORY = 1 << 30
 _LOOK_SECONDS = 3
 
 
-def main(path: str) -> int:
-    """Look at a file, within limits of memory and time; say on the output what is wrong with it."""
+def main(path: str, lazily: bool) -> int:
+    """Look at a file, or all of it but frames, within limits of memory and time; say what is wrong."""
     size = os.path.getsize(path)
     seconds = _LOOK_SECONDS + size // 50_000_000
     resource.setrlimit(resource.RLIMIT_AS, (_LOOK_MEMORY + 4 * size,) * 2)
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        load(path)
+        if lazily:
+            with opened(path) as file:
+                outline(file, size)
+        else:
+            load(path)
     except Damaged as error:
         print(error)
         return 1
@@ -338,4 +416,4 @@ def main(path: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(sys.argv[1], sys.argv[2:] == ["lazily"]))

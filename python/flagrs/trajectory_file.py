@@ -29,6 +29,7 @@ from flagrs import trajectory_checks
 from flagrs.errors import FileError, FileMissingError, FlagrsError, file_error
 from flagrs.files import Lock, check_output, publish, temporary_beside
 from flagrs.frame import ADDED, FIELDS
+from flagrs.lazy_frames import FrameStore, LazyField
 from flagrs.safe_stream import SafeStream
 from flagrs.scene.values import FloatArray
 from flagrs.trajectory_checks import FORMAT, FORMAT_VERSION, Damaged
@@ -39,6 +40,9 @@ CHUNK_BYTES = 64 * 1024
 #: Longest look at a file that nothing vouches for [s], besides 1 s for every 10 MB: it is limited by its own
 #: processor time, this is for a machine that has none to give.
 LOOK_SECONDS = 20.0
+
+#: Size of files from which on frames are read as they are asked for [bytes].
+LAZY_BYTES = 256 << 20
 
 State = dict[str, npt.NDArray[Any]]
 
@@ -190,11 +194,63 @@ def _add_fields(raw: dict[str, Any]) -> None:
             frames[name] = np.full((len(frames["time"]), *width), np.nan)
 
 
-def _look_at(path: Path) -> None:
+def read_as(path: Path, lazy: bool | None) -> Contents:
+    """Return what a file holds, with frames in memory, or in the file for large ones and if asked for."""
+    if lazy is None:
+        try:
+            lazy = path.stat().st_size >= LAZY_BYTES
+        except (OSError, ValueError):
+            lazy = False  # `read` says what is wrong
+    return read_lazily(path) if lazy else read(path)
+
+
+def read_lazily(path: Path) -> Contents:
+    """Return what a file holds, with frames that are read, and checked, as they are asked for.
+
+    The outline is looked at by a process of its own first. A file whose frames must be read to know how many
+    are whole is read as `read` does.
+
+    Raises
+    ------
+    FileError
+        As `read`; for a frame that has changed when it is read.
+    """
+    try:
+        if not path.exists():
+            raise FileMissingError(path, "no such file", 2)
+        if not path.is_file():
+            raise FileError(path, "not a file")
+        _look_at(path, lazily=True)
+        file = trajectory_checks.opened(os.fspath(path))
+        raw = trajectory_checks.outline(file, path.stat().st_size)
+        if raw is None or any(name not in raw["frames"] for name in ADDED):
+            file.close()
+            return read(path)
+        if raw["frames"].keys() != FIELDS.keys():
+            odd = ", ".join(sorted(raw["frames"].keys() ^ FIELDS.keys()))[:200]
+            raise FileError(path, f"damaged: missing or unknown fields: {odd}")
+        signals = {name: data[: len(raw["sums"])] for name, data in raw["signals"].items()}
+        store = FrameStore(file, os.fspath(path), raw["frames"], raw["signals"], raw["sums"])
+        frames: dict[str, Any] = {name: LazyField(store, name) for name in FIELDS}
+        frames["time"] = raw["time"]
+        state = _arrays(raw["state"])
+    except Damaged as error:
+        raise FileError(path, str(error)) from None
+    except (FileError, FlagrsError):
+        raise
+    except (OSError, ValueError) as error:
+        raise file_error(path, error, "cannot be read") from None
+    return Contents(
+        raw["manifest"], frames, signals, state, raw["state_frames"], raw["finished"], raw["wall_seconds"]
+    )
+
+
+def _look_at(path: Path, lazily: bool = False) -> None:
     """Read a file in a process of its own; raise FileError for what it finds, and if it has to be ended."""
     if not sys.executable:
         return  # embedded interpreters cannot start another
     command = [sys.executable, "-I", trajectory_checks.__file__, os.fspath(path.absolute())]
+    command += ["lazily"] if lazily else []
     limit = LOOK_SECONDS + path.stat().st_size / 1e7
     try:
         look = subprocess.run(

@@ -26,7 +26,7 @@ const JUDGED: f64 = 0.6;
 /// Pivots of the fit that count as zero, over the largest.
 const CUT: f64 = 1e-12;
 /// Spacing of sources over the reach of the surface, at first, and by what it is multiplied until the fit is good enough.
-const COARSEST: f64 = 0.7;
+const COARSEST: f64 = 1.2;
 const FINER: f64 = 0.84;
 /// Most sources: beyond, the fit takes minutes.
 const MOST_SOURCES: usize = 800;

@@ -3,9 +3,10 @@
 use super::bending::Bending;
 use super::twisting::Twisting;
 use crate::linear::pattern::Pattern;
-use crate::rod::assembly::{Assembly, HingeElement, Increment, Term};
+use crate::rod::assembly::{Assembly, HingeElement};
 use crate::rod::configuration::Configuration;
 use crate::rod::strain::{Gradient8, Hessian8};
+use crate::rod::term::{Conservative, Term, TermError};
 
 /// Bending and twisting of every hinge of a network.
 pub struct Hinges {
@@ -58,12 +59,15 @@ impl Term for Hinges {
     fn bind(&mut self, pattern: &Pattern) {
         self.elements.iter_mut().for_each(|element| element.bind(pattern));
     }
+}
 
-    fn energy(&self, configuration: &Configuration) -> f64 {
-        self.bending_energy(configuration) + self.twisting_energy(configuration)
+impl Conservative for Hinges {
+    fn energies(&self, configuration: &Configuration, count: &mut dyn FnMut(&'static str, f64)) {
+        count("bending", self.bending_energy(configuration));
+        count("twisting", self.twisting_energy(configuration));
     }
 
-    fn add(&self, configuration: &Configuration, _: &Increment, out: &mut Assembly) {
+    fn add(&self, configuration: &Configuration, _: f64, out: &mut Assembly) -> Result<(), TermError> {
         for (k, element) in self.elements.iter().enumerate() {
             let strain = configuration.strain(k);
             let mut gradient = Gradient8::zeros();
@@ -72,5 +76,6 @@ impl Term for Hinges {
             self.twisting[k].add(strain, &mut gradient, hessian.as_mut());
             element.add(configuration, gradient, hessian, out);
         }
+        Ok(())
     }
 }

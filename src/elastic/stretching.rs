@@ -2,9 +2,10 @@
 
 use crate::Mat3;
 use crate::linear::pattern::Pattern;
-use crate::rod::assembly::{Assembly, Element, Increment, Term};
+use crate::rod::assembly::{Assembly, Element};
 use crate::rod::configuration::Configuration;
 use crate::rod::network::Network;
+use crate::rod::term::{Conservative, Term, TermError};
 
 /// Stretching of every edge of a network.
 pub struct Stretching {
@@ -29,6 +30,16 @@ impl Stretching {
     /// Strain of an edge.
     pub fn strain(&self, configuration: &Configuration, edge: usize) -> f64 {
         configuration.length(edge) / self.rest_lengths[edge] - 1.0
+    }
+
+    /// Energy, J.
+    pub fn energy(&self, configuration: &Configuration) -> f64 {
+        (0..self.elements.len())
+            .map(|k| {
+                let strain = configuration.length(k) / self.rest_lengths[k] - 1.0;
+                0.5 * self.stiffness[k] * strain * strain * self.rest_lengths[k]
+            })
+            .sum()
     }
 
     fn tension(&self, configuration: &Configuration, edge: usize) -> f64 {
@@ -93,17 +104,15 @@ impl Term for Stretching {
     fn bind(&mut self, pattern: &Pattern) {
         self.elements.iter_mut().for_each(|element| element.bind(pattern));
     }
+}
 
-    fn energy(&self, configuration: &Configuration) -> f64 {
-        (0..self.elements.len())
-            .map(|k| {
-                let strain = configuration.length(k) / self.rest_lengths[k] - 1.0;
-                0.5 * self.stiffness[k] * strain * strain * self.rest_lengths[k]
-            })
-            .sum()
+impl Conservative for Stretching {
+    fn energies(&self, configuration: &Configuration, count: &mut dyn FnMut(&'static str, f64)) {
+        count("stretching", self.energy(configuration));
     }
 
-    fn add(&self, configuration: &Configuration, _: &Increment, out: &mut Assembly) {
+    fn add(&self, configuration: &Configuration, _: f64, out: &mut Assembly) -> Result<(), TermError> {
         self.add_turning(configuration, |k| self.tension(configuration, k), out);
+        Ok(())
     }
 }

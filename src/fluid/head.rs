@@ -2,10 +2,11 @@
 //! background flow (docs/theory/fluid.md, 9).
 
 use crate::linear::pattern::Pattern;
-use crate::rod::assembly::{Assembly, Element, Increment, Term};
+use crate::rod::assembly::{Assembly, Element, Increment};
 use crate::rod::configuration::{Configuration, node};
 use crate::rod::frames::Holonomy;
 use crate::rod::network::Network;
+use crate::rod::term::{External, Purpose, Term, TermError};
 use crate::{Mat3, Vec3};
 
 /// Most edges that may be fixed to a head; its matrix is made on the stack.
@@ -196,9 +197,16 @@ impl Term for Head {
         self.drag.bind(pattern);
         self.couple.bind(pattern);
     }
+}
 
-    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
+impl External for Head {
+    fn purpose(&self) -> Purpose {
+        Purpose::Head
+    }
+
+    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) -> Result<(), TermError> {
         self.add_drag(configuration, increment, out);
         self.add_couple(configuration, increment, out);
+        Ok(())
     }
 }

@@ -3,9 +3,10 @@
 //! Stokeslets give none; for Lim et al.'s flagella it adds about a tenth to the torque (docs/theory, "Twist drag").
 
 use crate::linear::pattern::Pattern;
-use crate::rod::assembly::{Assembly, Element, Increment, Term};
+use crate::rod::assembly::{Assembly, Element, Increment};
 use crate::rod::configuration::Configuration;
 use crate::rod::network::Network;
+use crate::rod::term::{External, Purpose, Term, TermError};
 
 /// Twist drag of the immersed edges.
 pub struct TwistDrag {
@@ -40,8 +41,14 @@ impl Term for TwistDrag {
     fn bind(&mut self, pattern: &Pattern) {
         self.elements.iter_mut().for_each(|element| element.bind(pattern));
     }
+}
 
-    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
+impl External for TwistDrag {
+    fn purpose(&self) -> Purpose {
+        Purpose::TwistDrag
+    }
+
+    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) -> Result<(), TermError> {
         for ((&edge, &coefficient), element) in self.edges.iter().zip(&self.coefficients).zip(&self.elements) {
             // Frames transported in time do not spin, so the material's spin in a step is the change of its angle.
             let dof = element.dofs[3];
@@ -65,5 +72,6 @@ impl Term for TwistDrag {
             }
             element.add(&residual, Some(&matrix), out);
         }
+        Ok(())
     }
 }

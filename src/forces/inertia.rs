@@ -1,8 +1,9 @@
 //! Inertia of nodes and edges, lumped.
 
 use crate::linear::pattern::Pattern;
-use crate::rod::assembly::{Assembly, Element, Increment, Term};
+use crate::rod::assembly::{Assembly, Element, Increment};
 use crate::rod::configuration::Configuration;
+use crate::rod::term::{External, Term, TermError};
 
 /// Lumped inertia, implicit: mass times the backward difference of rates, `M (q - q_n - dt v_n) / dt^2` at first
 /// order (equation 9).
@@ -31,12 +32,15 @@ impl Term for Inertia {
     fn bind(&mut self, pattern: &Pattern) {
         self.elements.iter_mut().for_each(|element| element.bind(pattern));
     }
+}
 
-    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
+impl External for Inertia {
+    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) -> Result<(), TermError> {
         for (dof, (&mass, element)) in self.mass.iter().zip(&self.elements).enumerate() {
             let gain = increment.rate_of(dof, configuration.q()[dof]) - increment.velocity[dof];
             let acceleration = increment.rate * gain + increment.velocity_drift[dof];
             element.add(&[mass * acceleration], Some(&[mass * increment.rate * increment.rate]), out);
         }
+        Ok(())
     }
 }

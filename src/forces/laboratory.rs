@@ -6,9 +6,10 @@
 use super::channels::{VectorChannels, vector};
 use super::edge_vector::{ANGLE, Gradient7, Hessian7, LAST, edge_dofs, spin_derivative, spread};
 use crate::linear::pattern::Pattern;
-use crate::rod::assembly::{Assembly, Element, Increment, Term};
+use crate::rod::assembly::{Assembly, Element, Increment};
 use crate::rod::configuration::Configuration;
 use crate::rod::network::Network;
+use crate::rod::term::{External, Purpose, Term, TermError};
 use crate::{Mat3, Vec3};
 
 /// A force that follows a signal, shared by nodes with weights.
@@ -34,12 +35,19 @@ impl Term for NodeForce {
     }
 
     fn bind(&mut self, _: &Pattern) {}
+}
 
-    fn add(&self, _: &Configuration, increment: &Increment, out: &mut Assembly) {
+impl External for NodeForce {
+    fn purpose(&self) -> Purpose {
+        Purpose::Load
+    }
+
+    fn add(&self, _: &Configuration, increment: &Increment, out: &mut Assembly) -> Result<(), TermError> {
         let force = vector(self.force, increment.inputs);
         for &(dof, weight) in &self.dofs {
             (0..3).for_each(|c| out.residual[dof + c] -= weight * force[c]);
         }
+        Ok(())
     }
 }
 
@@ -58,13 +66,19 @@ impl EdgeTorque {
     }
 }
 
-/// Generalised force of a torque on an edge, and its derivative.
-fn generalised(configuration: &Configuration, edge: usize, torque: &Vec3) -> (Gradient7, Hessian7) {
+/// Generalised force of a torque on an edge.
+fn generalised(configuration: &Configuration, edge: usize, torque: &Vec3) -> Gradient7 {
+    let (t, length) = (configuration.tangent(edge), configuration.length(edge));
+    let spin = torque.dot(&t);
+    spread(&(torque.cross(&t) / length + configuration.holonomy(edge).gradient * spin), spin)
+}
+
+/// Derivative of [`generalised`].
+fn derivative(configuration: &Configuration, edge: usize, torque: &Vec3) -> Hessian7 {
     let (t, length) = (configuration.tangent(edge), configuration.length(edge));
     let holonomy = configuration.holonomy(edge);
     let spin = torque.dot(&t);
     let lever = torque.cross(&t);
-    let force = spread(&(lever / length + holonomy.gradient * spin), spin);
     let spin_by_edge = (torque - t * spin) / length;
     let by_edge: Mat3 = (torque.cross_matrix() - lever * t.transpose() * 2.0) / (length * length)
         + holonomy.gradient * spin_by_edge.transpose()
@@ -75,7 +89,7 @@ fn generalised(configuration: &Configuration, edge: usize, torque: &Vec3) -> (Gr
         matrix.fixed_view_mut::<3, 3>(LAST, column).copy_from(&(by_edge * sign));
         matrix.fixed_view_mut::<1, 3>(ANGLE, column).copy_from(&(spin_by_edge.transpose() * sign));
     }
-    (force, matrix)
+    matrix
 }
 
 impl Term for EdgeTorque {
@@ -90,12 +104,25 @@ impl Term for EdgeTorque {
     fn bind(&mut self, pattern: &Pattern) {
         self.elements.iter_mut().for_each(|element| element.bind(pattern));
     }
+}
 
-    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
+impl External for EdgeTorque {
+    fn purpose(&self) -> Purpose {
+        Purpose::Load
+    }
+
+    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) -> Result<(), TermError> {
         let torque = vector(self.torque, increment.inputs);
         for (&(edge, factor), element) in self.edges.iter().zip(&self.elements) {
-            let (force, matrix) = generalised(configuration, edge, &(torque * factor));
-            element.add((-force).as_slice(), Some((-matrix).as_slice()), out);
+            let torque = torque * factor;
+            let force = -generalised(configuration, edge, &torque);
+            if out.jacobian.is_none() {
+                element.add(force.as_slice(), None, out);
+                continue;
+            }
+            let matrix = -derivative(configuration, edge, &torque);
+            element.add(force.as_slice(), Some(matrix.as_slice()), out);
         }
+        Ok(())
     }
 }

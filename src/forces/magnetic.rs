@@ -6,9 +6,10 @@
 use super::channels::{VectorChannels, vector};
 use super::edge_vector::{ANGLE, EdgeVector, Gradient7, Hessian7, LAST, edge_dofs};
 use crate::linear::pattern::Pattern;
-use crate::rod::assembly::{Assembly, Element, Increment, Term};
+use crate::rod::assembly::{Assembly, Element, Increment};
 use crate::rod::configuration::{Configuration, node};
 use crate::rod::network::Network;
+use crate::rod::term::{External, Purpose, Term, TermError};
 use crate::{Mat3, Vec3};
 
 /// The magnetic energy of a scene's magnetised edges.
@@ -53,8 +54,14 @@ impl Term for Magnetism {
     fn bind(&mut self, pattern: &Pattern) {
         self.elements.iter_mut().for_each(|element| element.bind(pattern));
     }
+}
 
-    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) {
+impl External for Magnetism {
+    fn purpose(&self) -> Purpose {
+        Purpose::Load
+    }
+
+    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly) -> Result<(), TermError> {
         for (&(edge, components), element) in self.moments.iter().zip(&self.elements) {
             let moment = EdgeVector::new(configuration, edge, components);
             let field = self.field_at(configuration, element, increment.inputs);
@@ -86,5 +93,6 @@ impl Term for Magnetism {
             }
             element.add(gradient.as_slice(), Some(hessian.as_slice()), out);
         }
+        Ok(())
     }
 }

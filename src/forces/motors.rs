@@ -4,8 +4,11 @@
 //! factor `cos^2(phi/2)`, and the joint would lose its bending stiffness once a turn; here the shaft's material frame
 //! is turned back by the motor angle in curvature and twist alike ([`crate::rod::configuration::Configuration::update`]).
 
-use crate::rod::configuration::ShaftAngle;
+use crate::linear::pattern::Pattern;
+use crate::rod::assembly::{Assembly, Increment};
+use crate::rod::configuration::{Configuration, ShaftAngle};
 use crate::rod::strain::{THETA_E, THETA_F};
+use crate::rod::term::{External, Purpose, Term, TermError};
 
 /// What drives a motor.
 #[derive(Debug, Clone)]
@@ -48,5 +51,50 @@ impl Motor {
     /// Torque on the shaft, N m, from the derivative of the hinge's energy with respect to its two angles.
     pub fn torque(&self, moments: [f64; 2]) -> f64 {
         if self.shaft_second { -moments[1] } else { moments[0] }
+    }
+}
+
+/// Torques of motors on the angles of their shafts, where these are degrees of freedom.
+pub struct MotorTorques {
+    /// Degree of freedom of every motor's angle; none where its speed is given.
+    dofs: Vec<Option<usize>>,
+}
+
+impl MotorTorques {
+    /// Those of the motors whose torque is given; `None` if there is none.
+    pub fn new(motors: &[Motor]) -> Option<Self> {
+        let dof = |motor: &Motor| match motor.drive {
+            Drive::Torque { dof } => Some(dof),
+            Drive::Speed => None,
+        };
+        let dofs: Vec<Option<usize>> = motors.iter().map(dof).collect();
+        dofs.iter().any(Option::is_some).then_some(Self { dofs })
+    }
+}
+
+impl Term for MotorTorques {
+    fn name(&self) -> &'static str {
+        "motor torques"
+    }
+
+    fn stencils(&self) -> Vec<Vec<usize>> {
+        Vec::new()
+    }
+
+    fn bind(&mut self, _: &Pattern) {}
+}
+
+impl External for MotorTorques {
+    fn purpose(&self) -> Purpose {
+        Purpose::Motor
+    }
+
+    fn add(&self, _: &Configuration, increment: &Increment, out: &mut Assembly) -> Result<(), TermError> {
+        for (dof, torque) in self.dofs.iter().zip(increment.motor_torques) {
+            if let Some(dof) = dof {
+                out.residual[*dof] -= torque;
+            }
+        }
+        Ok(())
     }
 }

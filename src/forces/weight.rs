@@ -1,8 +1,9 @@
 //! Forces that do not depend on the state: weight less buoyancy.
 
 use crate::linear::pattern::Pattern;
-use crate::rod::assembly::{Assembly, Increment, Term};
+use crate::rod::assembly::{Assembly, Increment};
 use crate::rod::configuration::Configuration;
+use crate::rod::term::{External, Purpose, Term, TermError};
 
 /// Forces that do not depend on the state: weight less buoyancy.
 pub struct Weight {
@@ -26,10 +27,17 @@ impl Term for Weight {
     }
 
     fn bind(&mut self, _: &Pattern) {}
+}
 
-    fn add(&self, _: &Configuration, _: &Increment, out: &mut Assembly) {
+impl External for Weight {
+    fn purpose(&self) -> Purpose {
+        Purpose::Gravity
+    }
+
+    fn add(&self, _: &Configuration, _: &Increment, out: &mut Assembly) -> Result<(), TermError> {
         for (residual, force) in out.residual.iter_mut().zip(&self.forces) {
             *residual -= force;
         }
+        Ok(())
     }
 }

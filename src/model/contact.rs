@@ -1,6 +1,7 @@
 //! How a scene's rods are kept apart: by one of two methods.
 
 use std::fmt;
+use std::sync::Arc;
 
 use crate::Vec3;
 use crate::contact::bodies::{Bodies, Body};
@@ -14,9 +15,9 @@ use crate::rod::network::Network;
 /// The method and its constants.
 pub enum ContactModel {
     /// Penetration is turned into forces by passes around the step's equations.
-    SpillmannTeschner(ContactLaw),
+    SpillmannTeschner(Arc<ContactLaw>),
     /// A potential in the step's equations that grows without bound.
-    Barrier(BarrierLaw),
+    Barrier(Arc<BarrierLaw>),
 }
 
 /// Two bodies that are too close, for messages.
@@ -50,17 +51,17 @@ impl ContactModel {
             &ContactMethodSpecification::SpillmannTeschner { tolerance, max_iterations } => {
                 let exclusion = Exclusion::new(count, edges, rest_lengths, radius, exclusion);
                 let law = ContactLaw::new(edges, radius, exclusion, colliding, tolerance, max_iterations);
-                Self::SpillmannTeschner(law)
+                Self::SpillmannTeschner(Arc::new(law))
             }
             ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocities, spheres } => {
                 let bodies = Bodies::new(count, edges, radius, rest_lengths, colliding, spheres, exclusion);
                 let law = BarrierLaw::new(bodies, *tolerance, 1.0).with_stiffness(stiffness.clone());
                 let sliding = Friction { coefficient: *friction, smoothing_velocity: f64::INFINITY };
-                Self::Barrier(if *friction > 0.0 {
+                Self::Barrier(Arc::new(if *friction > 0.0 {
                     law.with_friction(sliding).with_slip_velocities(slip_velocities.clone())
                 } else {
                     law
-                })
+                }))
             }
         }
     }

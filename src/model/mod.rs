@@ -28,7 +28,7 @@ use crate::fluid::rss::StokesletSegments;
 use crate::fluid::{FluidModel, immersed_part};
 use crate::forces::channels::Channels;
 use crate::forces::inertia::Inertia;
-use crate::forces::motors::{Drive, Motor};
+use crate::forces::motors::{Drive, Motor, MotorTorques};
 use crate::kinematics::clamp::{Clamp, ClampedEdge};
 use crate::linear::LinearError;
 use crate::linear::pattern::Pattern;
@@ -39,10 +39,11 @@ use crate::model::round_off::RoundOff;
 use crate::model::scene_terms::{dissipative_terms, load_terms, masses, regularization, spin_resistances, weights};
 use crate::model::specification::{FluidModelSpecification, Specification};
 use crate::model::storage::Storage;
-use crate::rod::assembly::{HingeElement, Term};
+use crate::rod::assembly::{Assembly, HingeElement, Increment};
 use crate::rod::configuration::{Configuration, ShaftAngle};
 use crate::rod::network::{Network, NetworkError};
 use crate::rod::reference::ReferenceFrames;
+use crate::rod::term::{Conservative, External, Term, TermError};
 use std::f64::consts::PI;
 
 /// A model cannot be built from its specification.
@@ -92,7 +93,8 @@ pub struct Model {
     pub(crate) dof_count: usize,
     pub(crate) stretching: Stretching,
     pub(crate) hinges: Hinges,
-    pub(crate) dissipative: Vec<Box<dyn Term>>,
+    /// Terms without an energy, but for inertia.
+    pub(crate) external: Vec<Box<dyn External>>,
     pub(crate) inertia: Inertia,
     pub(crate) motors: Vec<Motor>,
     pub(crate) clamps: Vec<Clamp>,
@@ -140,17 +142,18 @@ impl Model {
         let mut hinges = Hinges::new(elements, rest.bending(&specification), rest.twisting(&specification));
         let mass = masses(&specification, &network, dof_count, &rest.lengths);
         let mut inertia = Inertia::new(mass.clone());
-        let mut dissipative = dissipative_terms(&specification, &network, dof_count, &rest.lengths);
+        let mut external = dissipative_terms(&specification, &network, dof_count, &rest.lengths);
         let mut channels = Channels::default();
-        dissipative.extend(load_terms(&specification, &network, &rest.lengths, &mut channels));
+        external.extend(load_terms(&specification, &network, &rest.lengths, &mut channels));
+        external.extend(MotorTorques::new(&motors).map(|term| Box::new(term) as Box<dyn External>));
         let mut stencils: Vec<Vec<usize>> = stretching.stencils();
         stencils.extend(hinges.stencils());
-        stencils.extend(dissipative.iter().flat_map(|term| term.stencils()));
+        stencils.extend(external.iter().flat_map(|term| term.stencils()));
         let pattern = Pattern::from_stencils(dof_count, stencils.iter().map(Vec::as_slice));
         stretching.bind(&pattern);
         hinges.bind(&pattern);
         inertia.bind(&pattern);
-        dissipative.iter_mut().for_each(|term| term.bind(&pattern));
+        external.iter_mut().for_each(|term| term.bind(&pattern));
 
         let (clamps, prescribed) = clamps(&specification, &network, dof_count);
         let filaments = Filaments::new(&specification, &network, &stencils, &prescribed, &rest.lengths);
@@ -176,7 +179,7 @@ impl Model {
             dof_count,
             stretching,
             hinges,
-            dissipative,
+            external,
             inertia,
             motors,
             clamps,
@@ -202,6 +205,41 @@ impl Model {
     /// The law of barrier contact, if there is any.
     pub(crate) fn barrier(&self) -> Option<&BarrierLaw> {
         self.contact.as_ref().and_then(ContactModel::barrier)
+    }
+
+    /// The terms that have an energy; stretching comes first.
+    pub fn conservative(&self) -> impl Iterator<Item = &dyn Conservative> {
+        let elastic: [&dyn Conservative; 2] = [&self.stretching, &self.hinges];
+        elastic.into_iter()
+    }
+
+    /// Largest displacement, relative to the size of its filament.
+    pub(crate) fn relative_size(&self, moved: &[f64]) -> f64 {
+        moved.iter().zip(&self.error_weight).map(|(moved, weight)| moved.abs() * weight).fold(0.0, f64::max)
+    }
+
+    /// Adds the residual of the terms without an energy at a configuration at rest, under given values of the loads' signals.
+    pub(crate) fn add_at_rest(
+        &self,
+        time: f64,
+        inputs: &[f64],
+        configuration: &Configuration,
+        residual: &mut [f64],
+    ) -> Result<(), TermError> {
+        let zero = vec![0.0; self.dof_count];
+        let increment = Increment {
+            time,
+            rate: 0.0,
+            previous: &zero,
+            drift: &zero,
+            velocity: &zero,
+            velocity_drift: &zero,
+            inputs,
+            motor_torques: &vec![0.0; self.motors.len()],
+            background: None,
+        };
+        let mut out = Assembly { residual, jacobian: None };
+        self.external.iter().try_for_each(|term| term.add(configuration, &increment, &mut out))
     }
 
     /// Topology and numbering.
@@ -236,8 +274,8 @@ impl Model {
 
     /// Names of the active terms.
     pub fn term_names(&self) -> Vec<&'static str> {
-        let mut names = vec![self.stretching.name(), self.hinges.name()];
-        names.extend(self.dissipative.iter().map(|term| term.name()));
+        let mut names: Vec<&'static str> = self.conservative().map(|term| term.name()).collect();
+        names.extend(self.external.iter().map(|term| term.name()));
         names
     }
 

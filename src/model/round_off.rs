@@ -3,7 +3,6 @@
 use crate::model::Model;
 use crate::model::specification::Specification;
 use crate::rod::network::Network;
-use crate::step::problem::Step;
 
 /// Rounding errors gathered over those of single numbers.
 const GATHERED: f64 = 2.0;
@@ -62,9 +61,9 @@ impl RoundOff {
         all
     }
 
-    /// Round-off of every force (moments over the mean edge) in a step from the degrees of freedom `q`, N; `drag` is the resistance
-    /// of every degree of freedom to moving by itself, N s/m.
-    pub fn floors(&self, model: &Model, step: &Step, drag: &[f64], q: &[f64], out: &mut Vec<f64>) {
+    /// Round-off of every force (moments over the mean edge) in a step from the degrees of freedom `q`, N; rates change by `rate` of
+    /// displacements, their rates by `inertia`; `drag` is the resistance of every degree of freedom to moving by itself, N s/m.
+    pub fn floors(&self, model: &Model, (rate, inertia): (f64, f64), drag: &[f64], q: &[f64], out: &mut Vec<f64>) {
         let of_dof = model.filaments.of_dof();
         let mut positional = vec![false; q.len()];
         model.network.node_dofs().iter().for_each(|&dof| positional[dof..dof + 3].fill(true));
@@ -75,13 +74,12 @@ impl RoundOff {
             let largest = if positional[dof] { &mut farthest } else { &mut turned };
             largest[of_dof[dof]] = largest[of_dof[dof]].max(value.abs());
         }
-        let inertia = if step.scheme.has_inertia() { step.rate * step.rate } else { 0.0 };
         out.clear();
         out.extend((0..q.len()).map(|dof| {
             let (x, theta) = (farthest[of_dof[dof]], turned[of_dof[dof]]);
-            let own = (model.mass[dof] * inertia + drag[dof] * step.rate) * if positional[dof] { x } else { theta };
+            let own = (model.mass[dof] * inertia + drag[dof] * rate) * if positional[dof] { x } else { theta };
             let elastic = self.constant[dof] + self.position[dof] * x + self.angle[dof] * theta;
-            let spin = self.spin[dof] * step.rate * theta;
+            let spin = self.spin[dof] * rate * theta;
             GATHERED * f64::EPSILON * (elastic + spin + own) * model.force_weight[dof]
         }));
     }

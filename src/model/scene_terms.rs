@@ -11,8 +11,8 @@ use crate::forces::laboratory::{EdgeTorque, NodeForce};
 use crate::forces::magnetic::Magnetism;
 use crate::forces::weight::Weight;
 use crate::model::specification::{FluidModelSpecification, Frame, LoadKind, Specification};
-use crate::rod::assembly::Term;
 use crate::rod::network::Network;
+use crate::rod::term::External;
 
 /// Mass of a solid round edge, half on each node, and its moment of inertia `m a^2 / 2` about the centreline.
 pub(crate) fn masses(specification: &Specification, network: &Network, dof_count: usize, lengths: &[f64]) -> Vec<f64> {
@@ -47,8 +47,8 @@ pub(crate) fn dissipative_terms(
     network: &Network,
     dof_count: usize,
     lengths: &[f64],
-) -> Vec<Box<dyn Term>> {
-    let mut terms: Vec<Box<dyn Term>> = Vec::new();
+) -> Vec<Box<dyn External>> {
+    let mut terms: Vec<Box<dyn External>> = Vec::new();
     if let Some(fluid) = specification.fluid.as_ref().filter(|fluid| fluid.twist_drag) {
         let edges: Vec<usize> = (0..network.edges().len()).filter(|&edge| fluid.immersed[edge]).collect();
         let spin = spin_resistances(specification, lengths);
@@ -106,14 +106,14 @@ pub(crate) fn load_terms(
     network: &Network,
     lengths: &[f64],
     channels: &mut Channels,
-) -> Vec<Box<dyn Term>> {
-    let mut terms: Vec<Box<dyn Term>> = Vec::new();
+) -> Vec<Box<dyn External>> {
+    let mut terms: Vec<Box<dyn External>> = Vec::new();
     for load in &specification.loads {
         let channels = channels.take_vector();
         // Per length: half of an edge's share goes to each of its nodes.
         let halves = |edge: usize| (edge, [0.5 * lengths[edge]; 2]);
         let whole = |edge: usize| (edge, lengths[edge]);
-        let term: Box<dyn Term> = match (&load.kind, load.frame) {
+        let term: Box<dyn External> = match (&load.kind, load.frame) {
             (LoadKind::NodeForce { node, .. }, Frame::Laboratory) => {
                 Box::new(NodeForce::new(network, &[(*node, 1.0)], channels))
             }

@@ -242,7 +242,7 @@ mod tests {
         assert!(newton_alone.is_err());
         let found = solve_held(&mut held, 7e2).expect("continuation finds it");
         assert!((found / 1e-9 - 0.5_f64.atanh()).abs() < 1e-6, "{found}");
-        assert_eq!((held.factor, held.widths.first()), (1.0, Some(&2e12)));
+        assert!(held.factor == 1.0 && (held.widths[0] / 2e12 - 1.0).abs() < 1e-12, "{:?}", held.widths);
         assert!(held.widths.windows(2).all(|pair| pair[1] < pair[0] || pair[1] == 1.0), "{:?}", held.widths);
     }
 

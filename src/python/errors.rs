@@ -6,6 +6,7 @@ use pyo3::types::PyDict;
 use crate::fluid::far_field::{FarFieldError, LARGEST_TOLERANCE, SMALLEST_TOLERANCE};
 use crate::linear::LinearError;
 use crate::model::ModelError;
+use crate::rod::term::TermError;
 use crate::simulation::failure::StepError;
 
 fn make(py: Python<'_>, class: &str, message: &str, details: &Bound<'_, PyDict>) -> PyErr {
@@ -72,6 +73,11 @@ pub fn far_field_error(py: Python<'_>, error: &FarFieldError) -> PyErr {
 
 /// A linear system that cannot be solved.
 pub fn linear_error(py: Python<'_>, error: &LinearError) -> PyErr {
+    make(py, "FlagrsError", &error.to_string(), &PyDict::new(py))
+}
+
+/// A term without a force.
+pub fn term_error(py: Python<'_>, error: &TermError) -> PyErr {
     make(py, "FlagrsError", &error.to_string(), &PyDict::new(py))
 }
 

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use super::arrays::{from_points, points, values};
-use super::errors::{linear_error, model_error, scene_error, step_error};
+use super::errors::{linear_error, model_error, scene_error, step_error, term_error};
 use super::frame::{Reactions, frame_arrays, frame_error, reaction_arrays};
 use super::inputs::InputsInput;
 use super::rollout::{CaseInput, PlanInput};
@@ -192,22 +192,27 @@ impl Simulation {
         self.inner.place(&nodes, theta.as_deref()).map_err(|error| model_error(py, &error))
     }
 
-    /// Energies of stretching, bending and twisting, J.
-    fn energies(&mut self) -> [f64; 3] {
-        self.inner.energies()
+    /// Energies of all terms that have one, J, by name.
+    fn energies<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let energies = PyDict::new(py);
+        for (name, energy) in self.inner.energies() {
+            energies.set_item(name, energy)?;
+        }
+        Ok(energies)
     }
 
     /// Elastic gradient, (ndof,).
-    fn gradient<'py>(&mut self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.inner.elastic_derivatives().0)
+    fn gradient<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (gradient, _) = self.inner.elastic_derivatives().map_err(|error| term_error(py, &error))?;
+        Ok(PyArray1::from_vec(py, gradient))
     }
 
     /// Elastic Hessian: values, row indices and column starts of compressed columns.
-    fn hessian<'py>(&mut self, py: Python<'py>) -> Hessian<'py> {
-        let (_, hessian) = self.inner.elastic_derivatives();
+    fn hessian<'py>(&mut self, py: Python<'py>) -> PyResult<Hessian<'py>> {
+        let (_, hessian) = self.inner.elastic_derivatives().map_err(|error| term_error(py, &error))?;
         let pattern = self.inner.model().pattern();
         let indices = |values: &[usize]| PyArray1::from_iter(py, values.iter().map(|&value| value as i64));
-        (PyArray1::from_vec(py, hessian), indices(pattern.row_indices()), indices(pattern.column_starts()))
+        Ok((PyArray1::from_vec(py, hessian), indices(pattern.row_indices()), indices(pattern.column_starts())))
     }
 
     /// Resistance of the nodes, (3N, 3N), N s/m.

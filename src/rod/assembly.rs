@@ -12,6 +12,8 @@ use crate::linear::pattern::{ElementSlots, Pattern};
 /// drift.
 #[derive(Debug, Clone, Copy)]
 pub struct Increment<'a> {
+    /// Time at the end of the step, s.
+    pub time: f64,
     /// Derivative of every rate with respect to its degree of freedom, 1/s.
     pub rate: f64,
     /// Degrees of freedom at the beginning of the step.
@@ -24,6 +26,8 @@ pub struct Increment<'a> {
     pub velocity_drift: &'a [f64],
     /// Values of the loads' signals at the end of the step.
     pub inputs: &'a [f64],
+    /// Torques of motors at the end of the step, N m; zero for those of given speed.
+    pub motor_torques: &'a [f64],
     /// The background flow, if there is any.
     pub background: Option<Background<'a>>,
 }
@@ -53,26 +57,6 @@ pub struct Assembly<'a> {
     pub residual: &'a mut [f64],
     /// Values of the derivative on the model's sparsity pattern.
     pub jacobian: Option<&'a mut [f64]>,
-}
-
-/// One term of the force balance. A scene that lacks it does not carry it.
-pub trait Term: Send + Sync {
-    /// What the term is called in plans and profiles.
-    fn name(&self) -> &'static str;
-
-    /// The sets of degrees of freedom its elements couple.
-    fn stencils(&self) -> Vec<Vec<usize>>;
-
-    /// Looks up where its elements are stored; called once, after the pattern is known.
-    fn bind(&mut self, pattern: &Pattern);
-
-    /// Stored energy, J; zero for terms that have none.
-    fn energy(&self, _configuration: &Configuration) -> f64 {
-        0.0
-    }
-
-    /// Adds residual and derivative.
-    fn add(&self, configuration: &Configuration, increment: &Increment, out: &mut Assembly);
 }
 
 /// An element's degrees of freedom and the storage of its matrix.

@@ -6,7 +6,7 @@
 //! * [`strain`]: curvature and twist of one hinge with exact first and second derivatives.
 //! * [`mod@reference`]: frames that trial states are transported from.
 //! * [`configuration`]: everything about a trial state that several terms need, computed once.
-//! * [`assembly`]: how a term hands its gradient and Hessian blocks to the solver.
+//! * [`assembly`]: how a term hands its gradient and Hessian blocks to the solver; [`term`]: what all terms have.
 
 pub mod assembly;
 pub mod configuration;
@@ -15,3 +15,4 @@ pub mod frames;
 pub mod network;
 pub mod reference;
 pub mod strain;
+pub mod term;

@@ -7,8 +7,10 @@ use crate::signal::Signal;
 use crate::simulation::Simulation;
 use crate::simulation::failure::StepError;
 use crate::state::State;
-use crate::step::problem::{Step, Unknowns};
+use crate::step::given::{Drives, Step};
+use crate::step::problem::Problem;
 use crate::step::statistics::Statistics;
+use crate::step::unknowns::Unknowns;
 
 /// Most corrections of an interpolated state, and the parts of Newton's goal below which none is made any more and which the
 /// last one may have, its square being what it leaves.
@@ -31,7 +33,7 @@ impl Simulation {
         let mut state = self.interpolated(time)?;
         if !state.history.past.is_empty() {
             let shafts = self.model.shafts(&state.motor_angles, &state.q);
-            let configuration = &mut self.balance.configuration;
+            let configuration = &mut self.solver.at.configuration;
             if configuration.update(&self.model.network, &state.q, &state.frames, &shafts) {
                 configuration.accept(&mut state.frames);
                 self.settle(&mut state);
@@ -90,59 +92,57 @@ impl Simulation {
         let step = Step {
             scheme: self.scheme,
             state: &base,
-            motor_angles: base.motor_angles.clone(),
-            motor_torques,
+            end: state.time,
+            drives: Drives { motor_angles: base.motor_angles.clone(), motor_torques, inputs, ambient, outside: None },
             rate: 1.0 / (self.state.time - self.state.history.past[0].time),
             drift: base.velocity.clone(),
             velocity_drift: self.acceleration_at(state.time),
-            inputs,
-            ambient,
-            outside: None,
         };
         let mut found = Unknowns { q: base.q.clone(), density: base.density.clone(), tensions: base.tensions.clone() };
         if self.correct(&step, &mut found, goal).is_some() {
             let rates = state.velocity.iter_mut().zip(found.q.iter().zip(&base.q));
             rates.for_each(|(velocity, (new, old))| *velocity += step.rate * (new - old));
             if !self.model.clamps.is_empty()
-                && self.balance.evaluate(&self.model, &step, &found, &mut Statistics::default()).is_some()
+                && self.solver.evaluate(Problem::new(&self.model, &step), &found, &mut Statistics::default()).is_some()
             {
-                state.reactions = self.balance.reactions(&self.model, &found.q, &state.velocity);
+                state.reactions = self.solver.reactions(&self.model, &found.q, &state.velocity);
             }
             (state.q, state.density, state.tensions) = (found.q, found.density, found.tensions);
-            self.balance.configuration.accept(&mut state.frames);
+            self.solver.at.configuration.accept(&mut state.frames);
         }
     }
 
     /// Newton's method on the balance of forces, but for the fluid's equation, which needs the fluid's matrix there.
     fn correct(&mut self, step: &Step, found: &mut Unknowns, goal: f64) -> Option<()> {
-        let Self { model, balance, .. } = self;
+        let Self { model, solver, .. } = self;
+        let problem = Problem::new(model, step);
         let mut uncounted = Statistics::default();
-        if balance.fluid_mut().is_some_and(|fluid| fluid.is_local()) {
-            balance.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
+        if solver.medium.flow.model_mut().is_some_and(|fluid| fluid.is_local()) {
+            solver.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
         }
         // What else has moved the fluid since the step, such as a read-out or a restart, must not show.
-        balance.return_fluid(&step.state.fluid_nodes, &mut uncounted).ok()?;
-        balance.begin(model, step, &mut uncounted).ok()?;
+        solver.return_fluid(&step.state.fluid_nodes, &mut uncounted).ok()?;
+        solver.begin(model, step, &mut uncounted).ok()?;
         let (mut direction, mut left) = (found.clone(), f64::INFINITY);
         for _ in 0..MOST_CORRECTIONS {
-            balance.evaluate(model, step, found, &mut uncounted)?;
-            balance.forget_slip();
-            balance.linearize(model, step, &found.tensions, &mut uncounted).ok()?;
-            left = balance.correction(model, step, goal, &mut uncounted).ok()?.length;
-            balance.last_correction(model, step, &found.tensions, &mut direction).ok()?;
+            solver.evaluate(problem, found, &mut uncounted)?;
+            solver.forget_slip();
+            solver.linearize(problem, &found.tensions, &mut uncounted).ok()?;
+            left = solver.correction(problem, goal, &mut uncounted).ok()?.length;
+            solver.last_correction(problem, &found.tensions, &mut direction).ok()?;
             let from = found.q.clone();
             let parts = [(&mut found.q, &direction.q), (&mut found.density, &direction.density)];
             for (value, change) in parts.into_iter().chain([(&mut found.tensions, &direction.tensions)]) {
                 value.iter_mut().zip(change).for_each(|(value, change)| *value += change);
             }
-            if balance.step_limit(model, &from, &found.q, &mut uncounted) < 1.0 {
+            if solver.step_limit(&from, &found.q, &mut uncounted) < 1.0 {
                 return None;
             }
             if left <= SETTLED * goal {
                 break;
             }
         }
-        (left <= GOOD * goal && balance.place(model, step, &found.q)).then_some(())
+        (left <= GOOD * goal && problem.place(&found.q, &mut solver.at)).then_some(())
     }
 
     /// Torques of torque-driven motors, N m, unless one of their functions fails.

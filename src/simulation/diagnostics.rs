@@ -7,45 +7,48 @@ use crate::fluid::FluidModel;
 use crate::fluid::product::FarFieldChoice;
 use crate::forces::motors::Drive;
 use crate::linear::LinearError;
-use crate::model::contact::ContactModel;
+use crate::model::Model;
 use crate::rod::configuration::node;
+use crate::rod::term::TermError;
 use crate::signal::SignalError;
 use crate::simulation::Simulation;
+use crate::state::State;
+use crate::step::solver::Solver;
 
 /// Nodes up to which a resistance matrix is formed although steps do without the mobility's: with it, its factors and
 /// the mobility 3.5 GB.
 const MOST_RESISTANCES: usize = 4000;
 
 impl Simulation {
-    /// Energies of stretching, bending and twisting, J.
-    pub fn energies(&mut self) -> [f64; 3] {
-        self.balance.energies(&self.model, &self.state).unwrap_or([f64::NAN; 3])
+    /// Energies of all terms that have one, J, by name; none where the state is no configuration.
+    pub fn energies(&mut self) -> Vec<(&'static str, f64)> {
+        energies(&mut self.solver, &self.model, &self.state)
+    }
+
+    /// The same at another state.
+    pub(super) fn energies_of(&mut self, state: &State) -> Vec<(&'static str, f64)> {
+        energies(&mut self.solver, &self.model, state)
     }
 
     /// Elastic gradient and Hessian values on the model's pattern.
-    pub fn elastic_derivatives(&mut self) -> (Vec<f64>, Vec<f64>) {
-        self.balance.elastic(&self.model, &self.state)
+    ///
+    /// # Errors
+    /// [`TermError`] if a term has none.
+    pub fn elastic_derivatives(&mut self) -> Result<(Vec<f64>, Vec<f64>), TermError> {
+        self.solver.elastic(&self.model, &self.state)
     }
 
     /// Smallest gap between surfaces that may touch, m; `None` without contact.
     pub fn smallest_gap(&mut self) -> Option<f64> {
-        match (self.model.contact.as_ref()?, &mut self.balance.barrier) {
-            (ContactModel::Barrier(law), Some(barrier)) => {
-                barrier.closest(law, self.model.network.node_dofs(), &self.state.q).map(|approach| approach.gap())
-            }
-            (ContactModel::SpillmannTeschner(law), _) => {
-                law.smallest_gap(&self.state.positions(&self.model.network)).map(|(gap, _)| gap)
-            }
-            _ => None,
-        }
+        self.solver.medium.contact.as_mut()?.smallest_gap(&self.state.q)
     }
 
     /// Torque of every motor on its shaft, N m.
     pub fn motor_torques(&mut self) -> Vec<f64> {
-        if self.balance.energies(&self.model, &self.state).is_none() {
+        if !self.solver.place_state(&self.model, &self.state) {
             return vec![f64::NAN; self.model.motors.len()];
         }
-        let configuration = self.balance.configuration();
+        let configuration = &self.solver.at.configuration;
         self.model
             .motors
             .iter()
@@ -76,7 +79,7 @@ impl Simulation {
     pub fn force_density(&mut self) -> Result<Vec<f64>, LinearError> {
         if !self.state.density.is_empty() {
             let mut out = vec![0.0; 3 * self.model.network.node_count()];
-            if let Some(fluid) = self.balance.fluid_mut() {
+            if let Some(fluid) = self.solver.medium.flow.model_mut() {
                 for (&node, value) in fluid.immersed().iter().zip(self.state.density.chunks_exact(3)) {
                     out[3 * node..3 * node + 3].copy_from_slice(value);
                 }
@@ -94,7 +97,7 @@ impl Simulation {
     pub fn resistance(&mut self) -> Result<Vec<f64>, LinearError> {
         let nodes = self.model.network.node_count();
         let positions = self.state.positions(&self.model.network);
-        let mobility = self.balance.fluid_mut().and_then(FluidModel::nonlocal);
+        let mobility = self.solver.medium.flow.model_mut().and_then(FluidModel::nonlocal);
         let mut stored = match mobility.is_some_and(|mobility| mobility.is_matrix_free()) {
             true if nodes > MOST_RESISTANCES => {
                 let gigabytes = 72e-9 * (nodes * nodes) as f64;
@@ -104,14 +107,14 @@ impl Simulation {
             false => None,
         };
         if let Some(fluid) = &mut stored {
-            fluid.update(&positions, self.balance.threads.pool().as_deref())?;
+            fluid.update(&positions, self.solver.threads.pool().as_deref())?;
         } else {
             let mut ignored = crate::step::statistics::Statistics::default();
-            self.balance.place_fluid(&positions, &mut ignored)?;
+            self.solver.place_fluid(&positions, &mut ignored)?;
             self.forget_fluid();
         }
         let mut out = vec![0.0; 9 * nodes * nodes];
-        let Some(fluid) = stored.as_deref_mut().or_else(|| self.balance.fluid_mut()) else {
+        let Some(fluid) = stored.as_deref_mut().or_else(|| self.solver.medium.flow.model_mut()) else {
             return Ok(out);
         };
         let immersed = fluid.immersed().to_vec();
@@ -137,11 +140,11 @@ impl Simulation {
         let mut out = vec![0.0; 3 * self.model.network.node_count()];
         let positions = self.state.positions(&self.model.network);
         let mut ignored = crate::step::statistics::Statistics::default();
-        self.balance.place_fluid(&positions, &mut ignored)?;
+        self.solver.place_fluid(&positions, &mut ignored)?;
         self.forget_fluid();
-        let dofs = self.balance.fluid_dofs().to_vec();
-        let pool = self.balance.threads.pool();
-        let Some(fluid) = self.balance.fluid_mut() else {
+        let dofs = self.solver.medium.flow.dofs().to_vec();
+        let pool = self.solver.threads.pool();
+        let Some(fluid) = self.solver.medium.flow.model_mut() else {
             return Ok(out);
         };
         let mut values: Vec<f64> =
@@ -162,4 +165,15 @@ impl Simulation {
     pub fn velocities(&self) -> Vec<Vec3> {
         self.model.network.node_dofs().iter().map(|&dof| node(&self.state.velocity, dof)).collect()
     }
+}
+
+/// Energies of all terms at a state, J, by name; none if it is no configuration.
+fn energies(solver: &mut Solver, model: &Model, state: &State) -> Vec<(&'static str, f64)> {
+    let mut energies = Vec::new();
+    if solver.place_state(model, state) {
+        for term in model.conservative() {
+            term.energies(&solver.at.configuration, &mut |name, energy| energies.push((name, energy)));
+        }
+    }
+    energies
 }

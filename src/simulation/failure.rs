@@ -1,6 +1,8 @@
 //! What can go wrong with a step: as a user sees it, and as one try does.
 
 use crate::linear::LinearError;
+use crate::nonlinear::newton::NewtonFailure;
+use crate::rod::term::TermError;
 use crate::signal::SignalError;
 
 /// A step was not possible; the simulation stands at its last good state.
@@ -52,6 +54,18 @@ pub(crate) enum TryError {
 impl From<LinearError> for TryError {
     fn from(error: LinearError) -> Self {
         Self::Solve { residual: f64::NAN, iterations: 0, worst: None, reason: error.to_string() }
+    }
+}
+
+impl From<TermError> for TryError {
+    fn from(error: TermError) -> Self {
+        Self::Solve { residual: f64::NAN, iterations: 0, worst: None, reason: error.to_string() }
+    }
+}
+
+impl From<NewtonFailure> for TryError {
+    fn from(NewtonFailure { residual, iterations, worst, reason }: NewtonFailure) -> Self {
+        Self::Solve { residual, iterations, worst, reason }
     }
 }
 

@@ -7,6 +7,9 @@ use crate::simulation::failure::StepError;
 use crate::state::account::Account;
 use crate::state::reaction::Reaction;
 
+/// The energies that frames hold, in their order.
+const ELASTIC: [&str; 3] = ["stretching", "bending", "twisting"];
+
 /// One instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
@@ -60,6 +63,9 @@ impl Simulation {
         let motor_torques = self.motor_torques();
         let minimum_gap = self.smallest_gap().unwrap_or(f64::INFINITY);
         let energies = self.energies();
+        let elastic =
+            |part: &str| energies.iter().find(|(name, _)| *name == part).map_or(f64::NAN, |(_, energy)| *energy);
+        let energies = ELASTIC.map(elastic);
         let (state, network) = (self.state(), self.model().network());
         Ok(Frame {
             time: state.time,

@@ -20,16 +20,14 @@ use std::time::Instant;
 use crate::Vec3;
 use crate::bdf::control::{Control, Estimate};
 use crate::bdf::history::{History, Sample};
-use crate::contact::spillmann::ContactSolver;
 use crate::forces::outside::{ForceFunction, OutsideForce};
 use crate::inputs::Inputs;
 use crate::inputs::over_step::OverStep;
-use crate::model::contact::ContactModel;
 use crate::model::specification::Specification;
 use crate::model::{Model, ModelError};
 use crate::nonlinear::continuation;
 use crate::nonlinear::equations::Goal;
-use crate::nonlinear::newton::{self, NewtonSettings, NewtonWork};
+use crate::nonlinear::newton::{NewtonSettings, NewtonWork};
 use crate::runtime::interrupt::Hook;
 use crate::runtime::threads::Threads;
 use crate::simulation::adaptive::LONGEST_STEP;
@@ -37,11 +35,15 @@ use crate::simulation::failure::{StepError, TryError};
 use crate::simulation::progress::Progress;
 use crate::state::State;
 use crate::state::account::Account;
-use crate::step::budget::Accepted;
+use crate::step::contact::Review;
 use crate::step::equations::StepEquations;
-use crate::step::problem::{Balance, Drives, Step, Unknowns};
+use crate::step::given::{Drives, Step};
+use crate::step::ledger::Accepted;
+use crate::step::problem::Problem;
 use crate::step::scheme::Scheme;
+use crate::step::solver::Solver;
 use crate::step::statistics::Statistics;
+use crate::step::unknowns::Unknowns;
 
 /// Residual to which the force balance is solved between passes of the contact loop.
 const ROUGH_TOLERANCE: f64 = 1e-4;
@@ -63,12 +65,11 @@ pub struct Simulation {
     pub(crate) model: Arc<Model>,
     pub(crate) inputs: Inputs,
     pub(crate) state: State,
-    pub(crate) balance: Balance,
+    pub(crate) solver: Solver,
     pub(crate) scheme: Scheme,
     pub(crate) dt: f64,
     pub(crate) settings: NewtonSettings,
     pub(crate) work: NewtonWork<Unknowns>,
-    contact: Option<ContactSolver>,
     pub(crate) statistics: Statistics,
     fluid_step: Option<u64>,
     trial: Unknowns,
@@ -78,7 +79,6 @@ pub struct Simulation {
     /// What the function gave for the step with this number: a step that is tried again sees the same.
     pub(crate) given: Option<(u64, Arc<OutsideForce>)>,
     positions: Vec<Vec3>,
-    stiffness: Vec<f64>,
     pub(crate) progress: Progress,
 }
 
@@ -109,9 +109,8 @@ impl Simulation {
         dt: f64,
         thread_count: usize,
     ) -> Result<Self, ModelError> {
-        let balance = Balance::new(&model, Threads(thread_count))?;
-        let contact = model.contact.as_ref().and_then(ContactModel::spillmann).map(ContactSolver::new);
-        state.fit_density(balance.zero_density(scheme).len());
+        let solver = Solver::new(&model, Threads(thread_count))?;
+        state.fit_density(solver.density_length(scheme));
         state.check(&model, state.density.len())?;
         let trial = Unknowns { q: state.q.clone(), density: state.density.clone(), tensions: state.tensions.clone() };
         let mut simulation = Self {
@@ -122,7 +121,6 @@ impl Simulation {
             given: None,
             extrapolated: state.q.clone(),
             positions: state.positions(&model.network),
-            stiffness: Vec::new(),
             progress: Progress::default(),
             settings: NewtonSettings::default(),
             statistics: Statistics::default(),
@@ -130,10 +128,9 @@ impl Simulation {
             model,
             inputs,
             state: state.clone(),
-            balance,
+            solver,
             scheme,
             dt,
-            contact,
         };
         simulation.adopt(state)?;
         Ok(simulation)
@@ -203,9 +200,8 @@ impl Simulation {
 
     /// Goes back to a state from which steps were tried: the work that they took still counts.
     pub(crate) fn go_back(&mut self, state: State) {
-        if let (Some(law), Some(barrier)) = (self.model.barrier(), &mut self.balance.barrier) {
-            let positions = state.positions(&self.model.network);
-            barrier.ensure_at(law, if state.contact_anchor.is_empty() { &positions } else { &state.contact_anchor });
+        if let Some(contact) = &mut self.solver.medium.contact {
+            contact.restore(&state);
         }
         self.state = state;
         self.fluid_step = None;
@@ -221,7 +217,8 @@ impl Simulation {
         let flow = self.state.density.len();
         state.fit_density(flow);
         state.check(&self.model, flow)?;
-        if self.balance.energies(&self.model, &state).is_none_or(|energies| energies.iter().any(|e| !e.is_finite())) {
+        let energies = self.energies_of(&state);
+        if energies.is_empty() || energies.iter().any(|(_, energy)| !energy.is_finite()) {
             return Err(ModelError::Shape { shape: "nodes" });
         }
         if let Some(overlap) =
@@ -339,7 +336,7 @@ impl Simulation {
         // Forces of a step's beginning are right to first order, and only the first order's estimate sees what they leave out.
         let order = if self.force.is_some() { 1 } else { order.min(self.state.history.past.len() + 1) };
         let (t0, t1) = (self.state.time, self.state.time + dt);
-        self.balance.interrupt.begin();
+        self.solver.interrupt.begin();
         let mut trial = std::mem::take(&mut self.trial);
         self.open_account();
         let prepared = self.prepare(&mut trial, t0, t1);
@@ -350,7 +347,7 @@ impl Simulation {
             Ok((drives, departure, impulses, load_impulses))
         });
         self.trial = trial;
-        if self.balance.interrupt.stopped() {
+        if self.solver.interrupt.stopped() {
             return Err(self.interrupted());
         }
         let (drives, departure, impulses, load_impulses) = solved?;
@@ -367,10 +364,10 @@ impl Simulation {
             let control = Control { order, ..self.state.control };
             let mut unseen = departure / self.angle_tolerance() * tolerance;
             for (dof, impulse) in impulses {
-                unseen = unseen.max(self.balance.response(&self.model, dof)? * impulse / dt);
+                unseen = unseen.max(self.solver.response(&self.model, dof)? * impulse / dt);
             }
             for (channel, impulse) in load_impulses {
-                unseen = unseen.max(self.balance.response_to_load(&self.model, channel)? * impulse / dt);
+                unseen = unseen.max(self.solver.response_to_load(&self.model, t1, channel)? * impulse / dt);
             }
             let highest_order = if self.force.is_some() { 1 } else { self.scheme.highest_order() };
             let estimate = Estimate { missed: &missed, unseen, tolerance, highest_order };
@@ -407,7 +404,7 @@ impl Simulation {
 
     /// Sets what is asked every 50 ms of a step whether to give it up; `None` lets every step come to its end.
     pub fn set_interrupt(&mut self, hook: Option<Hook>) {
-        self.balance.interrupt.set(hook);
+        self.solver.interrupt.set(hook);
     }
 
     /// What drives the step; the guess, with the prescribed degrees of freedom set.
@@ -428,20 +425,7 @@ impl Simulation {
 
     /// Solves the step from the guess, contact included; what has driven it.
     fn solve(&mut self, mut drives: Drives, dt: f64, order: usize, trial: &mut Unknowns) -> Result<Drives, TryError> {
-        let Self {
-            model,
-            inputs,
-            state,
-            balance,
-            scheme,
-            settings,
-            work,
-            contact,
-            statistics,
-            positions,
-            stiffness,
-            ..
-        } = self;
+        let Self { model, inputs, state, solver, scheme, settings, work, statistics, positions, .. } = self;
         let dofs = model.network.node_dofs();
         let place = |q: &[f64], positions: &mut [Vec3]| {
             positions.iter_mut().zip(dofs).for_each(|(x, &dof)| *x = crate::rod::configuration::node(q, dof));
@@ -453,11 +437,11 @@ impl Simulation {
             state.history.extrapolate(reach, now, |sample| &sample.q, state.time + dt, &mut self.extrapolated);
             place(&self.extrapolated, positions);
             self.fluid_step = None;
-            balance.place_fluid(positions, statistics)?;
+            solver.place_fluid(positions, statistics)?;
         } else if self.fluid_step != Some(state.steps) {
             place(&state.q, positions);
             self.fluid_step = None;
-            balance.place_fluid(positions, statistics)?;
+            solver.place_fluid(positions, statistics)?;
             self.fluid_step = Some(state.steps);
         }
         if order == 1 && !inputs.flows().is_empty() {
@@ -465,61 +449,40 @@ impl Simulation {
         }
         drives.ambient = inputs.ambient(model.network.edges(), positions, state.time + dt)?;
         let step = Step::new(*scheme, state, dt, order, drives);
-        balance.begin(model, &step, statistics)?;
-        let failed = |failure: newton::NewtonFailure| TryError::Solve {
-            residual: failure.residual,
-            iterations: failure.iterations,
-            worst: failure.worst,
-            reason: failure.reason,
+        solver.begin(model, &step, statistics)?;
+        let failed = |reason: &str| TryError::Solve {
+            residual: f64::NAN,
+            iterations: 0,
+            worst: None,
+            reason: reason.to_owned(),
         };
-        let law = model.contact.as_ref().and_then(ContactModel::spillmann);
-        let (Some(law), Some(contact)) = (law, contact) else {
-            keep_apart(balance, model, &state.q, &mut trial.q, statistics)?;
-            let mut equations = StepEquations { model, step: &step, balance, statistics };
-            continuation::solve(&mut equations, settings, work, trial).map_err(failed)?;
-            return Ok(step.into_drives());
-        };
-        contact.begin(&state.contacts);
-        balance.node_stiffness(model, &step, stiffness);
-        place(&state.q, positions);
-        let mut violation = f64::INFINITY;
+        if !solver.keep_apart(model, &state.q, &mut trial.q, statistics) {
+            return Err(failed("what is prescribed moves filaments into each other"));
+        }
         let rough = match settings.goal {
             Goal::Residual(tolerance) => Goal::Residual(tolerance.max(ROUGH_TOLERANCE)),
             goal @ Goal::Correction(_) => goal,
         };
         let rough = NewtonSettings { goal: rough, ..*settings };
-        // While contact forces are being found, the balance between passes need not be solved to the last digit.
-        let mut settled = contact.forces().is_empty();
-        for _ in 0..law.max_iterations() {
-            balance.set_contact(|add| contact.spread(law, positions, add), dofs);
-            let wanted = if settled { *settings } else { rough };
-            let mut equations = StepEquations { model, step: &step, balance, statistics };
-            newton::solve(&mut equations, &wanted, work, trial).map_err(failed)?;
-            place(&trial.q, positions);
-            let start = Instant::now();
-            let loaded = !contact.forces().is_empty();
-            let pass = contact.pass(law, positions, stiffness);
-            statistics.seconds_contact += start.elapsed().as_secs_f64();
-            statistics.contact_iterations += u64::from(loaded || pass.pushing > 0);
-            violation = pass.violation;
-            if violation <= law.tolerance() && settled {
-                return Ok(step.into_drives());
+        loop {
+            // While contact forces are being found, the balance between passes need not be solved to the last digit.
+            let is_rough = solver.medium.contact.as_ref().is_some_and(|contact| contact.is_rough());
+            let wanted = if is_rough { rough } else { *settings };
+            let mut equations = StepEquations { problem: Problem::new(model, &step), solver, statistics };
+            continuation::solve(&mut equations, &wanted, work, trial)?;
+            match solver.review_contact(&trial.q, statistics) {
+                Review::Settled => return Ok(step.drives),
+                Review::Again => {}
+                Review::Failed(reason) => return Err(failed(&reason)),
             }
-            settled = violation <= law.tolerance();
         }
-        Err(TryError::Solve {
-            residual: f64::NAN,
-            iterations: law.max_iterations(),
-            worst: None,
-            reason: format!("contact left an overlap of {violation:.2e} of the sum of radii"),
-        })
     }
 
     /// Begins the account of energies at the present state, if none has begun.
     fn open_account(&mut self) {
-        let Self { state, balance, model, scheme, .. } = self;
-        if state.account.start.is_none() && balance.energies(model, state).is_some() {
-            let stored = balance.stored(model, &state.q, &state.velocity, scheme.has_inertia());
+        let Self { state, solver, model, scheme, .. } = self;
+        if state.account.start.is_none() && solver.place_state(model, state) {
+            let stored = solver.stored(model, &state.q, &state.velocity, scheme.has_inertia());
             state.account.begin(state.time, stored);
         }
     }
@@ -529,19 +492,19 @@ impl Simulation {
         let increment = step.increment();
         let velocity: Vec<f64> =
             self.trial.q.iter().enumerate().map(|(dof, &value)| increment.rate_of(dof, value)).collect();
-        let account = self.balance.account(&Accepted {
+        let account = self.solver.account(&Accepted {
             model: &self.model,
             step: &step,
             q: &self.trial.q,
             velocity: &velocity,
             density: &self.trial.density,
-            motor_angles: &step.motor_angles,
+            motor_angles: &step.drives.motor_angles,
             dt,
             order,
             shortest_lasting: INSTANT * self.dt,
-        });
-        let reactions = self.balance.reactions(&self.model, &self.trial.q, &velocity);
-        let angles = step.into_drives().motor_angles;
+        })?;
+        let reactions = self.solver.reactions(&self.model, &self.trial.q, &velocity);
+        let angles = step.drives.motor_angles;
         if !account.is_finite() {
             return Err(TryError::Solve {
                 residual: f64::NAN,
@@ -553,7 +516,7 @@ impl Simulation {
         let state = &mut self.state;
         state.account = account;
         state.reactions = reactions;
-        self.balance.keep_fluid_nodes(&mut state.fluid_nodes);
+        self.solver.keep_fluid_nodes(&mut state.fluid_nodes);
         let replaced = Sample {
             time: state.time,
             q: std::mem::replace(&mut state.q, self.trial.q.clone()),
@@ -562,50 +525,17 @@ impl Simulation {
         };
         state.tensions.copy_from_slice(&self.trial.tensions);
         state.history.accept(replaced, missed);
-        self.balance.configuration().accept(&mut state.frames);
+        self.solver.at.configuration.accept(&mut state.frames);
         state.time += dt;
         state.steps += 1;
         for (k, motor) in self.model.motors.iter().enumerate() {
             state.motor_angles[k] = motor.shaft(angles[k], &state.q).angle;
         }
-        if let Some(contact) = &self.contact {
-            state.contacts.clear();
-            state.contacts.extend_from_slice(contact.forces());
-        }
-        if let (Some(law), Some(barrier)) = (self.model.barrier(), &mut self.balance.barrier) {
-            let forces = barrier.forces(law, self.model.network.node_dofs(), &state.q);
-            state.contacts = forces.iter().map(|force| (force.indices(law), force.force.norm())).collect();
-            state.contact_anchor.clear();
-            state.contact_anchor.extend_from_slice(barrier.anchor());
-            self.statistics.contact_searches = barrier.searches();
+        if let Some(contact) = &mut self.solver.medium.contact {
+            contact.record(state);
+            self.statistics.contact_searches = contact.searches();
         }
         self.statistics.steps += 1;
         Ok(())
     }
-}
-
-/// Shortens the way from the beginning of a step to the guess at its end to what contact allows.
-fn keep_apart(
-    balance: &mut Balance,
-    model: &Model,
-    from: &[f64],
-    guess: &mut [f64],
-    statistics: &mut Statistics,
-) -> Result<(), TryError> {
-    if model.barrier().is_none() {
-        return Ok(());
-    }
-    let mut start = from.to_vec();
-    let prescribed = model.prescribed.iter().zip(start.iter_mut().zip(&*guess));
-    prescribed.filter(|(held, _)| **held).for_each(|(_, (start, end))| *start = *end);
-    let blocked =
-        |reason: &str| TryError::Solve { residual: f64::NAN, iterations: 0, worst: None, reason: reason.to_owned() };
-    if balance.step_limit(model, from, &start, statistics) < 1.0 {
-        return Err(blocked("what is prescribed moves filaments into each other"));
-    }
-    let limit = balance.step_limit(model, &start, guess, statistics);
-    if limit < 1.0 {
-        guess.iter_mut().zip(&start).for_each(|(guess, start)| *guess = start + limit * (*guess - start));
-    }
-    Ok(())
 }

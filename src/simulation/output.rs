@@ -53,7 +53,7 @@ impl Simulation {
 
     /// The interpolated state drawn back towards the beginning of its step as far as contact needs it.
     fn shortened(&mut self, start: &State, mut between: State) -> State {
-        let part = self.balance.step_limit(&self.model, &start.q, &between.q, &mut self.statistics);
+        let part = self.solver.step_limit(&start.q, &between.q, &mut self.statistics);
         between.q.iter_mut().zip(&start.q).for_each(|(q, start)| *q = start + part * (*q - start));
         between
     }

@@ -1,9 +1,5 @@
-//! Whether the work of Newton's method still moves the time on, and what to say where contact has stalled.
-//!
-//! Contact far too soft or far too stiff for the forces it bears, or of a tolerance far too fine, lets a step be solved only where it is
-//! minute: the run would not fail, and not end either.
+//! Whether the work of Newton's method still moves the time on; where contact has stalled, it does not.
 
-use crate::contact::potential::{BarrierLaw, ContactForce};
 use crate::simulation::Simulation;
 use crate::simulation::failure::StepError;
 
@@ -45,39 +41,16 @@ impl Progress {
 
 impl Simulation {
     /// An error if contact has stalled.
-    pub(crate) fn check_progress(&mut self) -> Result<(), StepError> {
-        let Some(law) = self.model.barrier() else { return Ok(()) };
+    pub(super) fn check_progress(&mut self) -> Result<(), StepError> {
+        let Some(contact) = self.solver.medium.contact.as_deref_mut().filter(|_| self.model.barrier().is_some()) else {
+            return Ok(());
+        };
         let (iterations, time) = (self.statistics.newton_iterations, self.state.time);
         let Some(advanced) = self.progress.stalled(iterations, time, self.dt) else { return Ok(()) };
-        let dofs = self.model.network.node_dofs();
-        let pushing = self.balance.barrier.as_mut().map(|barrier| barrier.forces(law, dofs, &self.state.q));
-        let size = |force: &ContactForce| force.contact.force;
-        let strongest = pushing.unwrap_or_default().into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
-        let Some(strongest) = strongest else { return Ok(()) };
-        let reason = stall(law, &strongest, advanced);
-        let worst = dofs[strongest.contact.nodes[0]];
-        Err(self.convergence_error(self.dt, f64::NAN, WINDOW as usize, Some(worst), reason))
+        let Some(stall) = contact.stall(&self.state.q, WINDOW, advanced) else { return Ok(()) };
+        let worst = self.model.network.node_dofs()[stall.node];
+        Err(self.convergence_error(self.dt, f64::NAN, WINDOW as usize, Some(worst), stall.reason))
     }
-}
-
-/// What to say of a stall whose strongest contact is this.
-fn stall(law: &BarrierLaw, strongest: &ContactForce, advanced: f64) -> String {
-    let [a, b] = strongest.bodies;
-    let pair = strongest.indices(law).map(|body| body as usize);
-    let (force, stiffness) = (strongest.contact.force, law.stiffness(pair));
-    let friction = if law.has_friction() { ", a larger slip_velocity" } else { "" };
-    let suitable = law.stiffness_to_hold(pair, force);
-    let (factor, side) =
-        if suitable > stiffness { (suitable / stiffness, "less") } else { (stiffness / suitable, "more") };
-    let held = format!(
-        "{a} and {b} press with {force:.2e} N, which about {suitable:.1e} Pa would hold at the sum of their radii"
-    );
-    let advice = "give another Contact.stiffness (None takes it from the scene), a larger Contact.tolerance than";
-    format!(
-        "contact has stalled: {WINDOW} Newton iterations moved the time on by {advanced:.1e} s; {held}; its stiffness, \
-         {stiffness:.1e} Pa, is {factor:.1e} times {side}; {advice} {}{friction}, or smaller loads",
-        law.delta(),
-    )
 }
 
 #[cfg(test)]

@@ -5,9 +5,9 @@ use crate::kinematics::clamp::Clamp;
 use crate::model::Model;
 use crate::rod::configuration::node;
 use crate::state::reaction::Reaction;
-use crate::step::problem::Balance;
+use crate::step::solver::Solver;
 
-impl Balance {
+impl Solver {
     /// What every clamp exerts: the residual of its degrees of freedom, where that of all others vanishes.
     ///
     /// Forces on nodes turn about the clamp's first node; the generalised force of an edge's angle is a torque along its tangent, less
@@ -17,15 +17,15 @@ impl Balance {
             let mut sum = Reaction::default();
             let pivot = clamp.nodes.first().map(|&dof| node(q, dof));
             for &dof in &clamp.nodes {
-                let force = node(&self.reaction, dof);
+                let force = node(&self.at.reaction, dof);
                 sum.force += force;
                 sum.torque += pivot.map_or_else(Vec3::zeros, |pivot| (node(q, dof) - pivot).cross(&force));
                 sum.power += force.dot(&node(velocity, dof));
             }
             for clamped in &clamp.edges {
-                let (edge, torque) = (clamped.edge, self.reaction[clamped.dof]);
-                let spin = self.configuration.vector(edge).cross(&self.configuration.holonomy(edge).gradient);
-                sum.torque += (self.configuration.tangent(edge) - spin) * torque;
+                let (edge, torque) = (clamped.edge, self.at.reaction[clamped.dof]);
+                let spin = self.at.configuration.vector(edge).cross(&self.at.configuration.holonomy(edge).gradient);
+                sum.torque += (self.at.configuration.tangent(edge) - spin) * torque;
                 sum.power += torque * velocity[clamped.dof];
             }
             sum

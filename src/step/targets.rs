@@ -5,7 +5,7 @@ use crate::Mat3;
 use crate::fluid::FluidModel;
 use crate::model::Model;
 use crate::nonlinear::equations::{Goal, Size};
-use crate::step::problem::Step;
+use crate::step::given::Step;
 
 /// Least force a filament is measured by, in its bending stiffness over its length squared.
 const LEAST: f64 = 1e-8;
@@ -42,19 +42,20 @@ impl Targets {
         }
     }
 
-    /// Prepares for the solve of a step from the degrees of freedom `q` to a goal.
+    /// Prepares for the solve of a step from the degrees of freedom `q` to a goal; an implicit fluid comes with the degrees of freedom of its
+    /// nodes.
     pub fn aim(
         &mut self,
         model: &Model,
         step: &Step,
         goal: Goal,
-        (fluid, fluid_dofs): (Option<&mut (dyn FluidModel + 'static)>, &[usize]),
+        fluid: Option<(&mut (dyn FluidModel + 'static), &[usize])>,
         q: &[f64],
     ) {
         self.goal = goal;
         self.drag.fill(0.0);
         self.drag_per_slip.clear();
-        if let Some(fluid) = fluid.filter(|_| step.scheme.fluid_is_implicit()) {
+        if let Some((fluid, fluid_dofs)) = fluid {
             let local: Vec<f64> = fluid.local().iter().map(|block: &Mat3| block.trace() / 3.0).collect();
             for (&dof, drag) in fluid_dofs.iter().zip(&local) {
                 self.drag[dof..dof + 3].fill(*drag);
@@ -63,7 +64,8 @@ impl Targets {
                 self.drag_per_slip.extend(local.iter().map(|drag| drag / mobility.scale()));
             }
         }
-        model.round_off.floors(model, step, &self.drag, q, &mut self.floor);
+        let inertia = if step.scheme.has_inertia() { step.rate * step.rate } else { 0.0 };
+        model.round_off.floors(model, (step.rate, inertia), &self.drag, q, &mut self.floor);
     }
 
     fn target(&self, model: &Model, dof: usize) -> f64 {

@@ -37,7 +37,7 @@ def test_the_flow_around_a_sphere_is_that_of_stokes() -> None:
 
 def test_accuracy_asks_for_sources_and_the_estimate_keeps_to_it() -> None:
     counts = []
-    for accuracy in (1e-2, 1e-3, 1e-4):
+    for accuracy in (5e-2, 5e-3, 1e-3):
         surface = BodySurface(flagrs.Capsule(radius=1.0, length=4.0), accuracy)
         assert surface.error <= accuracy
         counts.append(len(surface.sources))
@@ -45,8 +45,8 @@ def test_accuracy_asks_for_sources_and_the_estimate_keeps_to_it() -> None:
 
 
 def test_the_estimate_is_not_below_the_error() -> None:
-    shape = flagrs.Cylinder(radius=1.0, length=2.0)
-    coarse, fine = BodySurface(shape, 2e-2), BodySurface(shape, 5e-3)
+    shape = flagrs.Cylinder(radius=1.0, length=2.0, edge_radius=0.7)
+    coarse, fine = BodySurface(shape, 2e-2), BodySurface(shape, 2e-3)
     fine_diagonal = np.diag(fine.resistance(1.0))
     difference = np.abs(np.diag(coarse.resistance(1.0)) / fine_diagonal - 1.0).max()
     assert difference < coarse.error + fine.error

@@ -6,7 +6,7 @@ import flagrs
 import numpy as np
 import pytest
 from flagrs.stiff_filaments import Body, immersed_body, rss_response
-from flagrs.suggest import fluid_errors
+from flagrs.suggestion import fluid_errors
 from flagrs.time_step import size
 
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_rgb
 from scipy.sparse import csr_array, vstack
 
 from flagrs.plot.canvas import COLOURS, GREY
 from flagrs.results.paths import Path, paths_of
 from flagrs.scene import Scene
 from flagrs.scene.values import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from matplotlib.collections import PolyCollection
 
 #: Points of each round end.
 _ROUND = 7
@@ -48,6 +50,8 @@ class Look:
 
 def look_of(scene: Scene, colours: Sequence[str] = COLOURS) -> Look:
     """Return the look of a scene's rods: a colour for each filament, grey where not immersed."""
+    from matplotlib.colors import to_rgb
+
     weights, pieces, radius, body = [], [], [], []
     filament = points = 0
     for path in paths_of(scene):
@@ -101,6 +105,8 @@ def tubes(look: Look, nodes: FloatArray) -> PolyCollection:
     nodes
         Positions (N, 3): across, up, and towards the viewer.
     """
+    from matplotlib.collections import PolyCollection
+
     drawn = PolyCollection([], linewidths=0.0, antialiaseds=True)
     place(drawn, look, nodes)
     return drawn

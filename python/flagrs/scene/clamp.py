@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy.typing as npt
 from pydantic import Field, PlainValidator, model_validator
 
 from flagrs.errors import SceneError, faulty
 from flagrs.scene.part import Part
 from flagrs.scene.signal import CheckedSignal, Signal
-from flagrs.scene.values import Array, Bounds, FloatArray, Index, Indices, direction, origin
-from flagrs.scene.vector_signal import CheckedVectorSignal, VectorSignal, is_zero
+from flagrs.scene.values import Array, Bounds, FloatArray, Index, Indices, IntArray, direction, origin
+from flagrs.scene.vector_signal import CheckedVectorSignal, VectorInput, VectorSignal, is_zero
 
 
 class Rotation(Part):
@@ -27,6 +29,17 @@ class Rotation(Part):
     center : ndarray
         A point (3,) of the axis at time zero [m]; it moves along with the clamp.
     """
+
+    if TYPE_CHECKING:
+        # What the constructor takes, which is more than the fields hold.
+        def __init__(
+            self,
+            *,
+            axis: npt.ArrayLike,
+            rate: Signal = 0.0,
+            angle: Signal = 0.0,
+            center: npt.ArrayLike = ...,
+        ) -> None: ...
 
     axis: Annotated[FloatArray, PlainValidator(direction)]
     rate: CheckedSignal = 0.0
@@ -63,6 +76,21 @@ class Clamp(Part):
     >>> import math
     >>> shaken = Clamp(nodes=(0, 1), edges=(0,), displacement=lambda t: (0.0, 1e-3 * math.sin(t), 0.0))
     """
+
+    if TYPE_CHECKING:
+        # What the constructor takes, which is more than the fields hold.
+        def __init__(
+            self,
+            *,
+            rod: int = 0,
+            nodes: Sequence[int] | IntArray = (),
+            edges: Sequence[int] | IntArray = (),
+            axes: Literal["xyz", "xy", "xz", "yz", "x", "y", "z"] = "xyz",
+            angular_velocity: Signal = 0.0,
+            velocity: VectorInput = ...,
+            displacement: VectorInput = ...,
+            rotation: Rotation | None = None,
+        ) -> None: ...
 
     rod: Index = 0
     nodes: Indices = ()

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
 from flagrs.errors import SceneError, faulty
 from flagrs.scene.part import Part
-from flagrs.scene.values import Index, Indices, origin
-from flagrs.scene.vector_signal import CheckedVectorSignal, is_zero
+from flagrs.scene.values import Index, Indices, IntArray, origin
+from flagrs.scene.vector_signal import CheckedVectorSignal, VectorInput, is_zero
 
 Frame = Literal["laboratory", "material"]
 
@@ -39,6 +40,19 @@ class PointLoad(Part):
     >>> push = PointLoad(node=4, force=(0.0, 0.0, 1e-3))
     >>> follower = PointLoad(node=4, force=(0.0, 0.0, -1e-3), frame="material")
     """
+
+    if TYPE_CHECKING:
+        # What the constructor takes, which is more than the fields hold.
+        def __init__(
+            self,
+            *,
+            node: int | None = None,
+            force: VectorInput = ...,
+            edge: int | None = None,
+            torque: VectorInput = ...,
+            frame: Frame = "laboratory",
+            rod: int = 0,
+        ) -> None: ...
 
     node: Index | None = None
     force: CheckedVectorSignal = Field(default_factory=origin)
@@ -77,6 +91,18 @@ class LineLoad(Part):
     rod : int
         Index of the rod in the scene.
     """
+
+    if TYPE_CHECKING:
+        # What the constructor takes, which is more than the fields hold.
+        def __init__(
+            self,
+            *,
+            force: VectorInput = ...,
+            torque: VectorInput = ...,
+            edges: Sequence[int] | IntArray | None = None,
+            frame: Frame = "laboratory",
+            rod: int = 0,
+        ) -> None: ...
 
     force: CheckedVectorSignal = Field(default_factory=origin)
     torque: CheckedVectorSignal = Field(default_factory=origin)

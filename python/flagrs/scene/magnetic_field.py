@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field, PlainValidator, model_validator
 
 from flagrs.errors import not_allowed
 from flagrs.scene.part import Part
 from flagrs.scene.values import Array, Bounds, FloatArray, read_only
-from flagrs.scene.vector_signal import CheckedVectorSignal
+from flagrs.scene.vector_signal import CheckedVectorSignal, VectorInput
 
 #: How far a gradient may be from that of a field without sources, relative to its largest entry.
 SOURCE_FREE = 1e-6
@@ -33,6 +34,15 @@ class MagneticField(Part):
     >>> import math
     >>> rotating = MagneticField(field=lambda t: (1e-3 * math.cos(t), 1e-3 * math.sin(t), 0.0))
     """
+
+    if TYPE_CHECKING:
+        # What the constructor takes, which is more than the fields hold.
+        def __init__(
+            self,
+            *,
+            field: VectorInput,
+            gradient: npt.ArrayLike = ...,
+        ) -> None: ...
 
     field: CheckedVectorSignal
     gradient: Annotated[FloatArray, PlainValidator(Array(((3, 3),), Bounds("T/m")))] = Field(

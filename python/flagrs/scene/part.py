@@ -86,6 +86,17 @@ def _scene_error(error: ValidationError, known: list[str]) -> SceneError:
     return combined(_single_error(details, known) for details in error.errors(include_url=False))
 
 
+def field_errors(kind: type[Part], data: dict[str, Any]) -> list[SceneError]:
+    """Return what is wrong with the fields of a part, each by itself, without what holds between them."""
+    try:
+        # Past the constructor, whose error no longer tells fields from what holds between them.
+        kind.__pydantic_validator__.validate_python(data, self_instance=kind.__new__(kind))
+    except ValidationError as error:
+        known = list(kind.model_fields)
+        return [_single_error(found, known) for found in error.errors(include_url=False) if found["loc"]]
+    return []
+
+
 def _single_error(details: Any, known: list[str]) -> SceneError:
     path = "".join(f"[{item}]" if isinstance(item, int) else f".{item}" for item in details["loc"])
     field = path.removeprefix(".")

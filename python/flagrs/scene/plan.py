@@ -90,6 +90,12 @@ class Plan:
         )
         return 1.5 * self.fluid_bytes + vectors + NODE_BYTES * self.nodes
 
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        from flagrs.notebook import plan_html  # it reads plans, so it is above this module
+
+        return plan_html(self)
+
     def __str__(self) -> str:
         """Return the plan for a person to read."""
         lines = [

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import PlainValidator, model_validator
 
 from flagrs.errors import SceneError, combined
@@ -88,6 +89,30 @@ class Rod(Part):
     >>> rod.hinge_array().shape
     (9, 2)
     """
+
+    if TYPE_CHECKING:
+        # What the constructor takes, which is more than the fields hold.
+        def __init__(
+            self,
+            *,
+            nodes: npt.ArrayLike,
+            material: Material,
+            radius: npt.ArrayLike,
+            rest_nodes: npt.ArrayLike | None = None,
+            edges: npt.ArrayLike | None = None,
+            hinges: npt.ArrayLike | None = None,
+            EA: npt.ArrayLike | None = None,
+            EI: npt.ArrayLike | None = None,
+            GJ: npt.ArrayLike | None = None,
+            natural_curvature: npt.ArrayLike | None = None,
+            natural_twist: npt.ArrayLike | None = None,
+            theta: npt.ArrayLike | None = None,
+            director: npt.ArrayLike | None = None,
+            magnetization: npt.ArrayLike | None = None,
+            immersed: npt.ArrayLike = True,
+            colliding: npt.ArrayLike = True,
+            name: str | None = None,
+        ) -> None: ...
 
     nodes: Annotated[FloatArray, PlainValidator(Array(_NODES, Bounds("m")))]
     material: Material

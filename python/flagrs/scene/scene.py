@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field, PlainValidator, field_validator, model_validator
 
 from flagrs.errors import SceneError, combined, faulty
@@ -50,6 +52,23 @@ class Scene(Part):
     name : str
         Name for files and figures.
     """
+
+    if TYPE_CHECKING:
+        # What the constructor takes, which is more than the fields hold.
+        def __init__(
+            self,
+            *,
+            rods: Rod | Sequence[Rod],
+            fluid: Fluid | None = None,
+            head: Head | None = None,
+            motors: Motor | Sequence[Motor] = (),
+            clamps: Clamp | Sequence[Clamp] = (),
+            loads: Load | Sequence[Load] = (),
+            magnetic_field: MagneticField | None = None,
+            contact: Contact | None = None,
+            gravity: npt.ArrayLike = ...,
+            name: str = "scene",
+        ) -> None: ...
 
     rods: tuple[Rod, ...]
     fluid: Fluid | None = None
@@ -126,6 +145,12 @@ class Scene(Part):
     def plan(self) -> Plan:
         """Return what is simulated, what is left out and what a step costs; print it to read it."""
         return plan_of(self)
+
+    def _repr_html_(self) -> str:
+        """Show it in a notebook."""
+        from flagrs.notebook import scene_html  # it reads scenes, so it is above this module
+
+        return scene_html(self)
 
     def digest(self) -> str:
         """Return a hash of the whole description: scenes with the same one are the same scene."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import errno
+import inspect
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from flagrs.errors import (
     FileMissingError,
     FlagrsError,
     SceneError,
+    combined,
     faulty,
     file_error,
     not_allowed,
@@ -23,8 +25,10 @@ from flagrs.errors import (
 )
 from flagrs.scene.codec import plain
 from flagrs.scene.material import Material
+from flagrs.scene.part import field_errors
 from flagrs.scene.rod import Rod
 from flagrs.scene.scene import Scene
+from flagrs.scene.toml_lines import line_of, lines_of
 
 #: Largest file [bytes], and deepest nesting of tables and lists in one: a scene has rods, nodes, coordinates.
 LARGEST_FILE = 1 << 26
@@ -32,6 +36,9 @@ DEEPEST = 16
 
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _DEEP_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]{{0,8}}\.[ \t]{{0,8}}{_PART}){{{DEEPEST}}}")
+
+#: Stands for a material that is wrong, so that what else is wrong can be found.
+_ANY_MATERIAL = Material(youngs_modulus=1e6, density=1e3)
 
 _SHAPES: dict[str, Callable[..., Rod]] = {"helix": Rod.helix, "straight": Rod.straight}
 
@@ -63,14 +70,45 @@ def read(path: Path, changes: Mapping[str, Any] | None = None) -> Scene:
     FileError
         If it cannot be read; an `OSError`.
     """
-    data = _parsed(path)
-    if "scenario" in data:
-        return _from_scenario(data, changes or {})
-    return from_mapping(changed(data, changes or {}))
+    text, data = _parsed(path)
+    try:
+        if "scenario" in data:
+            return _from_scenario(data, changes or {})
+        return from_mapping(changed(data, changes or {}))
+    except SceneError as error:
+        raise _with_lines(error, path, lines_of(text), changes or {}) from None
 
 
-def _parsed(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file, after checking their size, depth and numbers."""
+def _with_lines(
+    error: SceneError, path: Path, lines: dict[str, int], changes: Mapping[str, Any]
+) -> SceneError:
+    """Return an error whose problems say on which line of a file they are, in the order of the file."""
+    by_line = []
+    for part in error.errors:
+        field = part.field or ""
+        # A scenario's parameters stand in a table of their own.
+        line = line_of(lines, field) or line_of(lines, f"parameters.{field}")
+        line = None if _is_changed(field, changes) else line
+        message = str(part) if line is None else f"line {line}: {part}"
+        same = SceneError(message, field=part.field, value=part.value, allowed=part.allowed)
+        by_line.append((line or 0, same))
+    parts = [part for _, part in sorted(by_line, key=lambda pair: pair[0])]
+    if len(parts) == 1:
+        only = parts[0]
+        where = f"{path}, {only}" if str(only).startswith("line ") else f"{path}: {only}"
+        return SceneError(where, field=only.field, value=only.value, allowed=only.allowed)
+    listed = "\n".join(f"  {part}" for part in parts)
+    return SceneError(f"{path}: {len(parts)} problems:\n{listed}", errors=parts)
+
+
+def _is_changed(field: str, changes: Mapping[str, Any]) -> bool:
+    """Return whether a field was given from outside the file: ``clamps[0].nodes`` by ``clamps.0.nodes``."""
+    dotted = field.replace("[", ".").replace("]", "")
+    return any(dotted == change or dotted.startswith(f"{change}.") for change in changes)
+
+
+def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
+    """Return the text and the tables of a TOML file, after checking their size, depth and numbers."""
     try:
         if not path.is_file():
             raise FileMissingError(path, "no such file" if not path.exists() else "not a file", errno.ENOENT)
@@ -95,7 +133,7 @@ def _parsed(path: Path) -> dict[str, Any]:
     except ValueError as error:  # numbers of thousands of digits, dates that do not exist
         raise SceneError(f"{path}: a value that cannot be: {error}") from None
     _check_values(data, "")
-    return data
+    return text, data
 
 
 def _check_values(value: Any, path: str, depth: int = 0) -> None:
@@ -119,11 +157,34 @@ def _check_values(value: Any, path: str, depth: int = 0) -> None:
 
 
 def from_mapping(data: Mapping[str, Any]) -> Scene:
-    """Return the scene a mapping describes, with rods given by their fields or by a shape's arguments."""
+    """Return the scene a mapping describes, with rods given by their fields or by a shape's arguments.
+
+    Raises
+    ------
+    SceneError
+        Listing everything that is wrong, as far as one problem does not hide others.
+    """
     rods = data.get("rods")
-    if isinstance(rods, list):
-        data = {**data, "rods": [_rod(entry, f"rods[{number}]") for number, entry in enumerate(rods)]}
-    return Scene(**data)
+    if not isinstance(rods, list):
+        return Scene(**data)
+    made, found = [], []
+    for number, entry in enumerate(rods):
+        try:
+            made.append(_rod(entry, f"rods[{number}]"))
+        except SceneError as error:
+            found.append(error)
+    if not found:
+        return Scene(**{**data, "rods": made})
+    # The rest of the scene is looked at on its own: what holds between parts needs all of them.
+    rest = {name: value for name, value in data.items() if name != "rods"}
+    stand_in = Rod.straight(length=1.0, edge_count=1, radius=1e-3, material=_ANY_MATERIAL)
+    raise combined([*found, *field_errors(Scene, {**rest, "rods": [*_shapeless(rods, stand_in)]})])
+
+
+def _shapeless(rods: list[Any], stand_in: Rod) -> Iterator[Any]:
+    """Yield the entries that are not given by a shape, which have been looked at, in their places."""
+    for entry in rods:
+        yield stand_in if isinstance(entry, dict) and "shape" in entry else entry
 
 
 def _from_scenario(data: dict[str, Any], changes: Mapping[str, Any]) -> Scene:
@@ -148,22 +209,27 @@ def _rod(entry: Any, path: str) -> Any:
     make = _SHAPES.get(shape) if isinstance(shape, str) else None
     if make is None:
         raise not_allowed(f"{path}.shape", entry["shape"], " or ".join(repr(shape) for shape in _SHAPES))
+    found = []
+    if isinstance(options.get("material"), dict):
+        try:
+            options["material"] = Material(**options["material"])
+        except SceneError as error:
+            found.append(error.within(f"{path}.material"))
+            options["material"] = _ANY_MATERIAL
+    arguments = set(inspect.signature(make).parameters) - {"options"}
+    known = arguments | set(Rod.model_fields) - {"nodes"}
+    for name in [name for name in options if name not in known]:
+        found.append(unknown_option(name, known, options.pop(name)).within(path))
     try:
-        if isinstance(options.get("material"), dict):
-            options["material"] = _material(options["material"])
-        return make(**options)
+        rod = make(**options)
     except SceneError as error:
-        raise error.within(path) from None
+        found.append(error.within(path))
     except TypeError as error:
         # Python's own words for a missing argument name it: "... required keyword-only argument: 'pitch'".
-        raise faulty(path, str(error).partition("() ")[2], f"the arguments of Rod.{entry['shape']}") from None
-
-
-def _material(fields: dict[str, Any]) -> Material:
-    try:
-        return Material(**fields)
-    except SceneError as error:
-        raise error.within("material") from None
+        found.append(faulty(path, str(error).partition("() ")[2], f"the arguments of Rod.{shape}"))
+    if found:
+        raise combined(found)
+    return rod
 
 
 def changed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

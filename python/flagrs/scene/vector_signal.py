@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import PlainValidator
 
 from flagrs.errors import SceneError, not_allowed
 from flagrs.scene.signal import Signal, Table, scalar_signal, signal_value
 from flagrs.scene.values import Array, Bounds, FloatArray, origin
 
+#: What a constructor takes for a vector signal.
+VectorInput = npt.ArrayLike | Sequence[Signal] | Table | Callable[[float], Sequence[float] | FloatArray]
 VectorSignal = FloatArray | tuple[Signal, Signal, Signal] | Table | Callable[[float], Sequence[float]]
 
 _numbers = Array(((3,),), Bounds("1"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -14,7 +16,7 @@ SILICONE = Material(youngs_modulus=1e6, density=1200.0)
 GRAVITY = 9.81
 
 
-def held(rod: int, edge_count: int, **motion: object) -> Clamp:
+def held(rod: int, edge_count: int, **motion: Any) -> Clamp:
     """Return the clamp of all of a rod."""
     return Clamp(rod=rod, nodes=tuple(range(edge_count + 1)), edges=tuple(range(edge_count)), **motion)
 

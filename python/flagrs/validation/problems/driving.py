@@ -28,8 +28,8 @@ START, SHEARED = math.radians(60.0), 2.0
 def shaken_shape(sperm_number: float) -> tuple[Complexes, Complexes]:
     """Return weights (4,) and rates (4,) of the shape of a filament shaken at one end, linear theory.
 
-    ``y = Im sum of c_k exp(a_k x + i t)`` with ``a_k^4 = -i Sp^4``, displaced and not tilted at x = 0, free at
-    x = 1, over the amplitude of the shaking.
+    ``y = Im sum of c_k exp(a_k x + i t)`` with ``a_k^4 = -i Sp^4``, displaced and not tilted at x = 0, free
+    at x = 1, over the amplitude of the shaking.
     """
     a = sperm_number * (-1j) ** 0.25 * np.array([1.0, 1j, -1.0, -1j])
     # Of the two that grow along x the values at the end are the unknowns, which stay of order one.
@@ -49,8 +49,8 @@ def shaken_tip(sperm_number: float) -> complex:
 def shaken_thrust(sperm_number: float) -> float:
     """Return the mean force of the clamp along the filament, over (zeta - zeta_along) omega amplitude^2.
 
-    Across it an element moves at ``y_t``, tilted by ``y_x``: the fluid pushes it along by ``(zeta - zeta_along)
-    y_t y_x`` per length, of which the mean is ``Re(i Y conj(Y_x)) / 2``; the clamp holds it back.
+    Across it an element moves at ``y_t``, tilted by ``y_x``: the fluid pushes it along by
+    ``(zeta - zeta_along) y_t y_x`` per length, whose mean is ``Re(i Y conj(Y_x)) / 2``; the clamp holds it.
     """
     weights, a = shaken_shape(sperm_number)
     # Integrals of products of exponentials over 0 < x < 1.
