@@ -168,7 +168,8 @@ fn follow(exact: Curve, slope: Curve, end: f64, tolerance: f64) -> Run {
             (slope(to)[c] + exact(to)[c] - past) / (weights[0] + 1.0)
         });
         let missed = kept.prediction_errors((now, &place), (to, &next), &[1.0; 2], &mut [0.0; 2]);
-        let estimate = Estimate { missed: &missed, unseen: 0.0, tolerance, highest_order: HIGHEST_ORDER };
+        let estimate =
+            Estimate { prediction_errors: &missed, input_error: 0.0, tolerance, highest_order: HIGHEST_ORDER };
         let (wanted, accepted) = control.judge(&kept.times(now, kept.past.len() + 1), to, &estimate);
         control = wanted;
         if !accepted {

@@ -82,13 +82,18 @@ def _passed(accounts: FloatArray) -> FloatArray:
     return passed
 
 
+def energy_passed(account: FloatArray) -> float:
+    """Return the energy that has passed in an account (42,) [J]."""
+    return float(_passed(account[None])[0])
+
+
 def given_by_drag(account: FloatArray) -> float:
     """Return the energy that fluid, twist drag and head have given in an account (42,), over that passed.
 
     Drag takes. Where it has given on the whole, as by the forces of velocities long gone, steps are unstable.
     """
     first = 1 + len(SOURCES)
-    taken, passed = account[first : first + len(DRAGS)], float(_passed(account[None])[0])
+    taken, passed = account[first : first + len(DRAGS)], energy_passed(account)
     return float(-taken[taken < 0.0].sum()) / passed if passed > 0.0 else 0.0
 
 

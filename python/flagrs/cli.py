@@ -6,13 +6,10 @@ import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.console import Console
-from rich.table import Table as TextTable
 
-from flagrs import scenarios
 from flagrs.commands.export import export
 from flagrs.commands.measure import measure
 from flagrs.commands.movie import movie
@@ -20,14 +17,13 @@ from flagrs.commands.new import new, schema
 from flagrs.commands.plot import check_image, draw, plot
 from flagrs.commands.view import view
 from flagrs.errors import FlagrsError, SceneError
-from flagrs.progress import ProgressBar
-from flagrs.runs import Run, RunSettings, measured, run_to_file
-from flagrs.scene import Scene, toml
-from flagrs.step_choice import steps_in_words
-from flagrs.suggestion import suggest
-from flagrs.trajectory import Trajectory
-from flagrs.units import rpm
 from flagrs.version import installed_version
+
+# What runs and reads scenes is imported by the commands that need it: help takes no second then.
+if TYPE_CHECKING:
+    from flagrs.runs import Run
+    from flagrs.scene import Scene
+    from flagrs.trajectory import Trajectory
 
 #: Clamps that the report of a run tells of.
 MOST_CLAMPS = 4
@@ -39,9 +35,6 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,  # it takes units in brackets for markup
 )
-
-for command in (plot, view, movie, measure, export, new, schema):
-    app.command()(command)
 
 #: Exit codes: what the user asked for cannot be, and what was asked for did not work out.
 BAD_INPUT, FAILED = 2, 1
@@ -65,6 +58,11 @@ def _common(
 @app.command("scenarios")
 def list_scenarios() -> None:
     """List the scenes that can be run by name, with their parameters."""
+    from rich.console import Console
+    from rich.table import Table as TextTable
+
+    from flagrs import scenarios
+
     table = TextTable("scenario", "what it is", "parameters and defaults")
     for name, summary in scenarios.list().items():
         options = ", ".join(f"{key}={value!r}" for key, value in scenarios.parameters(name).items())
@@ -95,6 +93,9 @@ def run(
     plan: Annotated[bool, typer.Option("--plan", help="Only say what would run and what it costs.")] = False,
 ) -> None:
     """Run a scene into a file; an interrupted run goes on where it was."""
+    from flagrs.progress import ProgressBar
+    from flagrs.runs import RunSettings, run_to_file
+
     described = scene_from(scene, changes or [])
     if plan:
         typer.echo(described.plan())
@@ -133,6 +134,8 @@ def suggest_settings(
     ] = None,
 ) -> None:
     """Say with which settings a scene is simulated to an error, and what no setting cures."""
+    from flagrs.suggestion import suggest
+
     typer.echo(suggest(scene_from(scene, changes or []), error))
 
 
@@ -189,6 +192,8 @@ def validate(
     listed: Annotated[bool, typer.Option("--list", help="Only say what problems there are.")] = False,
 ) -> None:
     """Solve problems with known answers and compare: found, expected, tolerance, order of convergence."""
+    from rich.console import Console
+
     from flagrs import validation  # the other commands do without
     from flagrs.validation import table
     from flagrs.validation.report import write_report
@@ -228,6 +233,9 @@ def scene_from(name: str, changes: Sequence[str]) -> Scene:
     SceneError
         If there is no such file or scenario, or a change is not allowed.
     """
+    from flagrs import scenarios
+    from flagrs.scene import toml
+
     options = dict(_change(text) for text in changes)
     path = Path(name)
     if path.suffix != ".toml":
@@ -249,6 +257,10 @@ def _change(text: str) -> tuple[str, Any]:
 
 
 def _report(done: Run, path: Path) -> str:
+    from flagrs.runs import measured
+    from flagrs.step_choice import steps_in_words
+    from flagrs.units import rpm
+
     trajectory = done.trajectory
     values = measured(trajectory)
     simulated = float(trajectory.time[-1]) if len(trajectory) else 0.0
@@ -258,7 +270,8 @@ def _report(done: Run, path: Path) -> str:
     if done.resumed_at is not None:
         lines.append(f"went on from t = {done.resumed_at:g} s")
     if values["swimming_speed"] is not None:
-        lines.append(f"swimming speed    {1e3 * values['swimming_speed']:.4g} mm/s")
+        speed = f"{1e3 * values['swimming_speed']:.4g} mm/s"
+        lines.append(f"swimming speed    {speed}{_certainty(trajectory)}")
     if values["head_rate"] is not None:
         lines.append(f"head rate         {values['head_rate'] / rpm(1.0):.4g} rpm")
     if values["efficiency"] is not None:
@@ -287,7 +300,21 @@ def _clamps(trajectory: Trajectory) -> list[str]:
     return lines
 
 
+def _certainty(trajectory: Trajectory) -> str:
+    """Return the standard error of the speed in words, where it is known, and whether it still changes."""
+    from flagrs.results.swimming import swimming_of
+
+    try:
+        speed = swimming_of(trajectory, None, None).speed
+    except FlagrsError:
+        return ""  # too few frames
+    known = f" ± {1e3 * speed.error:.1g}" if speed.error > 1e-9 * speed.value else ""
+    return known if speed.stationary else f"{known}, not steady yet"
+
+
 def _say_what_is_saved(path: Path) -> None:
+    from flagrs.trajectory import Trajectory
+
     try:
         trajectory = Trajectory.load(path)
     except (FlagrsError, OSError):
@@ -300,6 +327,11 @@ def _say_what_is_saved(path: Path) -> None:
 
 
 def _print_rows(rows: Sequence[dict[str, Any]]) -> None:
+    from rich.console import Console
+    from rich.table import Table as TextTable
+
+    from flagrs.units import rpm
+
     table = TextTable("pitch / R", "nodes", "rpm", "speed [mm/s]", "head [rpm]", "wall [s]")
     for row in rows:
         speed, head = row["swimming_speed"], row["head_rate"]
@@ -312,6 +344,10 @@ def _print_rows(rows: Sequence[dict[str, Any]]) -> None:
             f"{row['wall_seconds']:.1f}",
         )
     Console(markup=False).print(table)
+
+
+for command in (plot, view, movie, measure, export, new, schema):
+    app.command()(command)
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from flagrs import _flagrs
 from flagrs.assemble import native_scene
+from flagrs.fluid import mobility as matrix_of
 from flagrs.load_sizes import nodal_loads
 from flagrs.scene import Fluid, Rod, Scene
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
@@ -31,6 +32,8 @@ FREE_ROOT = 4.73
 CLAMPED_ROOT = 1.875
 #: Slowest rate that may be elastic, over the least that stiffness, length and drag allow.
 ELASTIC_SHARE = 0.1
+#: Nodes up to which a network's drag is that of all its nodes together.
+NETWORK_NODES = 200
 #: Filaments examined: where there are more, half of these that look slowest and half that look fastest.
 MOST_FILAMENTS = 100
 
@@ -210,6 +213,36 @@ class Network:
         """Return the slowest modes of the filaments that bend; of the extreme ones where there are many."""
         return [found for label in self._chosen() if (found := self._relaxation(label)) is not None]
 
+    def _together(self, label: int, dofs: IntArray) -> FloatArray | None:
+        """Return by how much the nodes of a network resist more together than each by itself (n, n) [N s/m].
+
+        In nonlocal drag arms that meet hinder each other's motion, and a mode may decay several times more
+        slowly than with local drag. None where drag is local, for chains, for which the slender coefficients
+        stand, and for networks too large to be looked at as a whole.
+        """
+        fluid, model = self.scene.fluid, self.scene.fluid and self.scene.fluid.model
+        own = np.flatnonzero((self.labels[self.node_dofs[self.edges]] == label).any(axis=1))
+        wet = own[np.array(self._native["fluid"]["immersed"])[own]] if model == "RSS" else own[:0]
+        nodes, ends = np.unique(self.edges[wet], return_inverse=True)
+        if fluid is None or not 0 < len(nodes) <= NETWORK_NODES or np.bincount(ends.ravel()).max() < 3:
+            return None
+        ends = ends.reshape(-1, 2)
+        at = self._native["rest_nodes"][nodes]
+        widths = fluid.epsilon_array(self._native["radius"][wet])
+        mobility = matrix_of(at, ends, widths, threads=1) / (8.0 * np.pi * fluid.viscosity)
+        # Forces of a density that is linear along edges, tested with the nodes' hat functions.
+        hats = np.zeros((len(nodes), len(nodes)))
+        for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            np.add.at(hats, (ends[:, i], ends[:, j]), self.lengths[wet] / (3.0 if i == j else 6.0))
+        nonlocal_drag = np.kron(hats, np.eye(3)) @ np.linalg.inv(mobility)
+        rows = (self.node_dofs[nodes][:, None] + np.arange(3)).ravel()
+        more = 0.5 * (nonlocal_drag + nonlocal_drag.T) - self.resistance[rows][:, rows].toarray()
+        free = np.isin(rows, dofs)
+        places = np.searchsorted(dofs, rows[free])
+        found = np.zeros((len(dofs), len(dofs)))
+        found[np.ix_(places, places)] = more[np.ix_(free, free)]
+        return found
+
     @cached_property
     def _order(self) -> tuple[IntArray, IntArray]:
         """Degrees of freedom by filament, and where each filament's start."""
@@ -255,8 +288,12 @@ class Network:
         stiffness = self.stiffness[dofs][:, dofs]
         resistance = self.resistance[dofs][:, dofs]
         least = float(self._least[label])
+        together = self._together(label, dofs)
         try:
-            eigenvalue = _slowest(stiffness, resistance, least)
+            if together is None:
+                eigenvalue = _slowest(stiffness, resistance, least)
+            else:
+                eigenvalue = _slowest_densely(stiffness, resistance + together, least)
         except (np.linalg.LinAlgError, scipy.sparse.linalg.ArpackError, RuntimeError):
             # Stiffnesses too far apart to find eigenvalues: a clamped beam as soft as the softest part.
             eigenvalue = CLAMPED_ROOT**4 * least / ELASTIC_SHARE
@@ -270,6 +307,13 @@ class Network:
             time=1.0 / eigenvalue if self.is_wet[label] else 2.0 * math.pi / math.sqrt(eigenvalue),
             size=float(np.linalg.norm(extent)) / 20.0,
         )
+
+
+def _slowest_densely(stiffness: Any, resistance: FloatArray, least: float) -> float | None:
+    """Return what `_slowest` does, for a full resistance."""
+    fastest = float((abs(stiffness).sum(axis=1) / resistance.diagonal()).max())
+    rates = scipy.linalg.eigh(stiffness.toarray(), resistance, eigvals_only=True)
+    return _first_above(rates, max(least, 30.0 * np.finfo(float).eps * fastest))
 
 
 def _slowest(stiffness: Any, resistance: Any, least: float) -> float | None:

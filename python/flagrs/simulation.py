@@ -400,11 +400,8 @@ class Simulation(ReadOuts, LiveInputs, Calling):
         if not isinstance(state, Mapping):
             raise not_allowed("state", state, "what state() returned")
         present = self._native.state()
-        added = {
-            "fluid_nodes": np.zeros((0, 3)),
-            "clamp_reactions": np.zeros_like(present["clamp_reactions"]),
-        }
-        state = added | dict(state)
+        still = np.zeros_like(present["clamp_reactions"])
+        state = {"clamp_reactions": still} | dict(state)
         missing = present.keys() - state.keys()
         if missing:
             raise not_allowed("state", f"without {', '.join(sorted(missing))}", "what state() returned")

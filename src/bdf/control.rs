@@ -42,10 +42,10 @@ impl Default for Control {
 /// What is known of the error of a step that was tried.
 #[derive(Debug, Clone, Copy)]
 pub struct Estimate<'a> {
-    /// How much each order's extrapolation of the past states missed the result, from order zero on.
-    pub missed: &'a [f64],
-    /// What else went unseen within the step: how far its inputs depart from what their ends suggest.
-    pub unseen: f64,
+    /// How far the extrapolation of the past states by each order, from zero on, was from the result.
+    pub prediction_errors: &'a [f64],
+    /// How far inputs depart within the step from what their values at its ends suggest.
+    pub input_error: f64,
     /// What the error may be, in the same unit.
     pub tolerance: f64,
     /// Highest order the scheme is stable with.
@@ -53,13 +53,13 @@ pub struct Estimate<'a> {
 }
 
 /// The error of a step of the given order made from times `past` (newest first) to `to`, if the extrapolation of the
-/// same order through them missed the result by `missed`.
+/// same order through them was off by `prediction_error`.
 ///
 /// It is the leading error of the backward difference's rate, times the step. The error of a position is that over the rate's
 /// weight of it, and the result misses in the other direction than the extrapolation: on equal steps both together make
 /// this 1.5, 1.8 and 2.1 times the error at orders 1, 2 and 3.
-fn local_error(order: usize, past: &[f64], to: f64, missed: f64) -> f64 {
-    (to - past[0]) / (to - past[order]) * missed
+fn local_error(order: usize, past: &[f64], to: f64, prediction_error: f64) -> f64 {
+    (to - past[0]) / (to - past[order]) * prediction_error
 }
 
 /// By how much a step may grow for an error of so many times the tolerance, if the error goes with that power of the step.
@@ -73,12 +73,12 @@ impl Control {
     pub fn judge(&self, past: &[f64], to: f64, estimate: &Estimate) -> (Self, bool) {
         let dt = to - past[0];
         let factor = |order: usize| -> Option<f64> {
-            let missed = *estimate.missed.get(order)?;
-            let error = local_error(order, past, to, missed) / estimate.tolerance;
+            let prediction_error = *estimate.prediction_errors.get(order)?;
+            let error = local_error(order, past, to, prediction_error) / estimate.tolerance;
             Some(growth_for(error, order as f64 + 1.0))
         };
         // What inputs hide shrinks with the step, at the second power where they jump.
-        let hidden = growth_for(estimate.unseen / estimate.tolerance, 2.0);
+        let hidden = growth_for(estimate.input_error / estimate.tolerance, 2.0);
         let extrapolated = factor(self.order);
         let own = extrapolated.unwrap_or(f64::INFINITY).min(hidden);
         if own < SAFETY {
@@ -118,7 +118,7 @@ mod tests {
     use crate::bdf::history::{History, Sample, derivative_weights};
 
     fn estimate(missed: &[f64], tolerance: f64) -> Estimate<'_> {
-        Estimate { missed, unseen: 0.0, tolerance, highest_order: HIGHEST_ORDER }
+        Estimate { prediction_errors: missed, input_error: 0.0, tolerance, highest_order: HIGHEST_ORDER }
     }
 
     /// One backward difference of the given order for `y' = rate (y - exact) + exact'`, from exact past values: its error,
@@ -196,10 +196,10 @@ mod tests {
         let (past, to) = ([0.0, -1.0], 1.0);
         let control = Control { dt: 1.0, order: 1, ..Control::default() };
         let missed = [0.0, 0.0];
-        let hidden = Estimate { unseen: 1.1, ..estimate(&missed, 1.0) };
+        let hidden = Estimate { input_error: 1.1, ..estimate(&missed, 1.0) };
         assert!(!control.judge(&past, to, &hidden).1);
         // Also in a first step, which nothing else tells of.
-        assert!(!control.judge(&past[..1], to, &Estimate { missed: &missed[..1], ..hidden }).1);
+        assert!(!control.judge(&past[..1], to, &Estimate { prediction_errors: &missed[..1], ..hidden }).1);
     }
 
     #[test]

@@ -59,7 +59,7 @@ impl Candidates {
 
     /// Makes the list hold every pair in range of `nodes` (m), and says whether it is another list now.
     pub fn ensure(&mut self, bodies: &Bodies, nodes: &[Vec3]) -> bool {
-        self.spare(nodes) < 0.0 && self.list(bodies, nodes)
+        self.slack(nodes) < 0.0 && self.list(bodies, nodes)
     }
 
     /// Makes the list anew at `nodes` (m), and says whether it is another one now.
@@ -106,7 +106,7 @@ impl Candidates {
     }
 
     /// How much further every node may move (m) before a pair outside the list can be in range; negative if that has happened.
-    pub fn spare(&self, nodes: &[Vec3]) -> f64 {
+    pub fn slack(&self, nodes: &[Vec3]) -> f64 {
         0.5 * self.skin - moved(nodes, &self.positions)
     }
 

@@ -42,16 +42,16 @@ pub fn safe_part(from: &[Vec3; 4], to: &[Vec3; 4], least: f64, limit: f64) -> f6
         return 0.0;
     }
     let kept = KEPT * gap;
-    let (mut time, mut spare) = (0.0, gap - kept);
+    let (mut time, mut clearance) = (0.0, gap - kept);
     for _ in 0..MOST_MEASURED {
-        if spare >= speed * (limit - time) {
+        if clearance >= speed * (limit - time) {
             return limit;
         }
-        if spare <= CLOSE * kept {
+        if clearance <= CLOSE * kept {
             break;
         }
-        time += spare / speed;
-        spare = distance_at(time) - least - kept;
+        time += clearance / speed;
+        clearance = distance_at(time) - least - kept;
     }
     time
 }

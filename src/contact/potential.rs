@@ -346,7 +346,7 @@ impl BarrierLaw {
     ///
     /// Any displacement is allowed: if it leaves the range of the list of near pairs, the whole way is searched.
     pub fn step_limit(&self, state: &mut BarrierState, from: &[Vec3], to: &[Vec3]) -> f64 {
-        let listed = state.candidates.spare(from) >= 0.0 && state.candidates.spare(to) >= 0.0;
+        let listed = state.candidates.slack(from) >= 0.0 && state.candidates.slack(to) >= 0.0;
         let shorten = |limit: f64, pair: [usize; 2]| {
             let least = self.bodies.barrier(pair, self.delta).least();
             safe_part(&self.bodies.corners(pair, from), &self.bodies.corners(pair, to), least, limit)
@@ -363,7 +363,7 @@ impl BarrierLaw {
     pub fn smallest_gap(&self, state: &mut BarrierState, nodes: &[Vec3]) -> Option<Approach> {
         let listed = self.closest(state.candidates.pairs().iter().copied(), nodes);
         // A pair outside the list was further than the range and the skin when it was made.
-        let known = 2.0 * (self.delta * self.bodies.thinnest() + state.candidates.spare(nodes));
+        let known = 2.0 * (self.delta * self.bodies.thinnest() + state.candidates.slack(nodes));
         if listed.is_some_and(|approach| approach.gap() <= known) {
             return listed;
         }

@@ -37,6 +37,17 @@ impl Hinges {
         2.0 * (0.5 * (kappa[0] - natural[0]).hypot(kappa[1] - natural[1])).atan()
     }
 
+    /// Size of the integrated curvature of a hinge without moment.
+    pub fn natural_curvature(&self, hinge: usize) -> f64 {
+        let natural = self.bending[hinge].natural;
+        natural[0].hypot(natural[1])
+    }
+
+    /// Twist of a hinge without moment, rad.
+    pub fn natural_twist(&self, hinge: usize) -> f64 {
+        self.twisting[hinge].natural
+    }
+
     /// Derivative of a hinge's energy with respect to the angles of its first and second edge, N m.
     pub fn moments(&self, hinge: usize, configuration: &Configuration) -> [f64; 2] {
         let mut gradient = Gradient8::zeros();

@@ -99,7 +99,7 @@ impl NearlySymmetric {
         if self.pivoted {
             return solved;
         }
-        if solved.is_ok() && self.miss(rhs, x) <= TRUSTED * size(rhs) {
+        if solved.is_ok() && self.find_residual(rhs, x) <= TRUSTED * size(rhs) {
             return Ok(());
         }
         self.factor_with_pivoting()?;
@@ -116,7 +116,8 @@ impl NearlySymmetric {
         x.copy_from_slice(rhs);
         let trusted = TRUSTED * size(rhs);
         let solved = self.solve(x).is_ok()
-            && (self.miss(rhs, x) <= trusted || (self.refine(x).is_ok() && self.miss(rhs, x) <= trusted));
+            && (self.find_residual(rhs, x) <= trusted
+                || (self.refine(x).is_ok() && self.find_residual(rhs, x) <= trusted));
         if solved { Ok(()) } else { self.solve_checked(rhs, x) }
     }
 
@@ -126,7 +127,7 @@ impl NearlySymmetric {
     /// As [`Self::solve_checked`].
     pub fn solve_refined(&mut self, rhs: &[f64], x: &mut [f64]) -> Result<(), LinearError> {
         self.solve_checked(rhs, x)?;
-        self.miss(rhs, x);
+        self.find_residual(rhs, x);
         self.refine(x)
     }
 
@@ -139,8 +140,13 @@ impl NearlySymmetric {
         solved
     }
 
+    /// `out += K x` for the matrix itself.
+    pub fn multiply_add(&self, x: &[f64], out: &mut [f64]) {
+        self.pattern.multiply_add(&self.values, x, out);
+    }
+
     /// Leaves `K x - rhs` in the workspace and returns its largest entry.
-    fn miss(&mut self, rhs: &[f64], x: &[f64]) -> f64 {
+    fn find_residual(&mut self, rhs: &[f64], x: &[f64]) -> f64 {
         self.residual.iter_mut().zip(rhs).for_each(|(residual, rhs)| *residual = -rhs);
         self.pattern.multiply_add(&self.values, x, &mut self.residual);
         size(&self.residual)

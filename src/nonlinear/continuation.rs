@@ -223,9 +223,13 @@ mod tests {
     }
 
     fn solve_held(held: &mut Held, guess: f64) -> Result<f64, NewtonFailure> {
+        solve_within(held, guess, 15)
+    }
+
+    fn solve_within(held: &mut Held, guess: f64, max_iterations: usize) -> Result<f64, NewtonFailure> {
         let mut at = guess;
         let mut work = NewtonWork::new(&at);
-        solve(held, &NewtonSettings { max_iterations: 15, ..NewtonSettings::default() }, &mut work, &mut at)?;
+        solve(held, &NewtonSettings { max_iterations, ..NewtonSettings::default() }, &mut work, &mut at)?;
         Ok(at)
     }
 
@@ -259,5 +263,24 @@ mod tests {
         let found = solve_held(&mut held, 1e-12).expect("continuation finds it");
         // The force of friction is one: the spring bears the rest.
         assert!((found - 2.0e3).abs() < 1e-6, "{found}");
+    }
+
+    #[test]
+    fn a_width_that_is_too_much_is_tried_again_by_the_root_of_its_factor() {
+        // Four iterations do not go a power of ten at once, but its root; three need the fourth root.
+        for (iterations, factor) in [(4, 10.0_f64.sqrt()), (3, 10.0_f64.sqrt().sqrt())] {
+            let mut held = Held::new(0.5);
+            solve_within(&mut held, 7e2, iterations).expect("smaller factors lead there");
+            let last = held.widths.iter().rev().skip_while(|width| **width < 3.0);
+            let last: Vec<f64> = last.take(2).copied().collect();
+            assert!((last[1] / last[0] / factor - 1.0).abs() < 1e-9, "{iterations}: {:?}", held.widths);
+        }
+    }
+
+    #[test]
+    fn equations_that_cannot_be_led_keep_the_given_width() {
+        let mut held = Held::new(0.5);
+        assert!(solve_within(&mut held, 7e2, 2).is_err());
+        assert!(held.factor == 1.0 && held.widths.len() > 1);
     }
 }

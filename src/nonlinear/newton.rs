@@ -73,7 +73,7 @@ pub fn solve<E: Equations>(
     at: &mut E::Point,
 ) -> Result<(), NewtonFailure> {
     equations.aim(settings.goal, at);
-    let mut newton = Newton { equations, work, at };
+    let mut newton = Newton { equations, work, at, blocked: None };
     match settings.goal {
         Goal::Residual(_) => newton.reduce_residual(settings.max_iterations),
         Goal::Correction(tolerance) => newton.reduce_correction(tolerance, settings.max_iterations),
@@ -94,6 +94,8 @@ struct Newton<'a, E: Equations> {
     equations: &'a mut E,
     work: &'a mut NewtonWork<E::Point>,
     at: &'a mut E::Point,
+    /// Why the last trial had no residual, if it had none.
+    blocked: Option<String>,
 }
 
 impl<E: Equations> Newton<'_, E> {
@@ -113,7 +115,15 @@ impl<E: Equations> Newton<'_, E> {
     fn try_length(&mut self, length: f64) -> Option<Size> {
         let NewtonWork { direction, trial } = self.work;
         self.equations.advance(self.at, direction, length, trial);
-        self.equations.evaluate(trial)
+        let size = self.equations.evaluate(trial);
+        self.blocked = if size.is_some() { None } else { Some(self.equations.obstacle(trial).reason) };
+        size
+    }
+
+    /// What to say of a line search without success: why its shortest trial had no residual, or that it was no better.
+    fn stuck(&self, size: Size, iteration: usize, what: &str) -> NewtonFailure {
+        let reason = self.blocked.as_ref().map_or_else(|| what.to_owned(), |blocked| format!("{what}: {blocked}"));
+        failure(Some(size), iteration, &reason)
     }
 
     /// The part of the direction that may be gone.
@@ -161,7 +171,7 @@ impl<E: Equations> Newton<'_, E> {
                     size = self.evaluate_start()?;
                     continue;
                 }
-                return Err(failure(Some(size), iteration, "the line search found no lower residual"));
+                return Err(self.stuck(size, iteration, "the line search found no lower residual"));
             };
             self.accept();
             size = lower;
@@ -205,7 +215,7 @@ impl<E: Equations> Newton<'_, E> {
                     size = self.evaluate_start()?;
                     continue;
                 }
-                return Err(failure(Some(size), iteration, "the line search found no smaller correction"));
+                return Err(self.stuck(size, iteration, "the line search found no smaller correction"));
             };
             self.accept();
             size = trial;

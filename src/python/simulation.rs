@@ -129,8 +129,7 @@ impl Simulation {
 
     #[getter]
     fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let state = self.inner.state();
-        PyArray1::from_iter(py, self.inner.model().network().edge_dofs().iter().map(|&dof| state.q[dof]))
+        angles_of(py, &self.inner)
     }
 
     /// Degrees of freedom and their rates, in the interleaved numbering.
@@ -195,7 +194,7 @@ impl Simulation {
     /// Energies of all terms that have one, J, by name.
     fn energies<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let energies = PyDict::new(py);
-        for (name, energy) in self.inner.energies() {
+        for (name, energy) in self.inner.balanced(core::Simulation::energies).map_err(|error| step_error(py, error))? {
             energies.set_item(name, energy)?;
         }
         Ok(energies)
@@ -279,8 +278,9 @@ impl Simulation {
     }
 
     /// Forces (C, 3), torques (C, 3) and powers (C,) of the clamps in the last step.
-    fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Reactions<'py>> {
-        reaction_arrays(py, &self.inner.state().reactions)
+    fn reactions<'py>(&mut self, py: Python<'py>) -> PyResult<Reactions<'py>> {
+        let reactions = self.inner.balanced(|inner| inner.state().reactions.clone());
+        reaction_arrays(py, &reactions.map_err(|error| step_error(py, error))?)
     }
 
     /// Takes many states of this simulation's model forward, side by side; see `flagrs.rollout`.
@@ -292,6 +292,12 @@ impl Simulation {
     ) -> PyResult<Bound<'py, PyList>> {
         super::rollout::rollout(py, &self.inner, cases, &plan)
     }
+}
+
+/// Angles of the edges, rad.
+fn angles_of<'py>(py: Python<'py>, inner: &core::Simulation) -> Bound<'py, PyArray1<f64>> {
+    let state = inner.state();
+    PyArray1::from_iter(py, inner.model().network().edge_dofs().iter().map(|&dof| state.q[dof]))
 }
 
 /// Lets `steps` run without the interpreter's lock, looking for Ctrl-C; what a signal handler raised comes out of it.

@@ -41,7 +41,6 @@ pub fn state_arrays<'py>(py: Python<'py>, state: &State) -> PyResult<Bound<'py, 
     out.set_item("contact_pairs", PyArray1::from_iter(py, pairs).reshape([state.contacts.len(), 2])?)?;
     out.set_item("contact_anchor", from_points(py, &state.contact_anchor)?)?;
     out.set_item("account", PyArray1::from_slice(py, &state.account.numbers()))?;
-    out.set_item("fluid_nodes", from_points(py, &state.fluid_nodes)?)?;
     let reactions: Vec<f64> = state.reactions.iter().flat_map(Reaction::numbers).collect();
     out.set_item("clamp_reactions", PyArray1::from_vec(py, reactions).reshape([state.reactions.len(), WIDTH])?)?;
     out.set_item("contact_forces", PyArray1::from_iter(py, state.contacts.iter().map(|(_, force)| *force)))?;
@@ -73,7 +72,6 @@ pub struct StateInput<'py> {
     contact_forces: PyReadonlyArray1<'py, f64>,
     contact_anchor: PyReadonlyArray2<'py, f64>,
     account: PyReadonlyArray1<'py, f64>,
-    fluid_nodes: PyReadonlyArray2<'py, f64>,
     clamp_reactions: PyReadonlyArray2<'py, f64>,
 }
 
@@ -158,7 +156,6 @@ impl StateInput<'_> {
             contacts: contacts(py, self)?,
             account,
             contact_anchor: points(py, "contact_anchor", &self.contact_anchor)?,
-            fluid_nodes: points(py, "fluid_nodes", &self.fluid_nodes)?,
             reactions: reactions(self),
         })
     }

@@ -40,7 +40,7 @@ impl Simulation {
     }
 
     /// What the tolerance lets prescribed angles miss within a step, rad.
-    pub(crate) fn angle_tolerance(&self) -> f64 {
+    pub(super) fn angle_tolerance(&self) -> f64 {
         let angles = self.model.network.edge_dofs().iter().map(|&dof| self.model.error_weight[dof]);
         let weight = angles.fold(0.0, f64::max);
         self.tolerance.filter(|_| weight > 0.0).map_or(f64::INFINITY, |error| error / weight)

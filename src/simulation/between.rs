@@ -2,11 +2,12 @@
 
 use crate::forces::motors::{Drive, Motor};
 use crate::model::contact::ContactModel;
-use crate::nonlinear::equations::Goal;
+use crate::nonlinear::equations::{Equations, Goal};
 use crate::signal::Signal;
 use crate::simulation::Simulation;
 use crate::simulation::failure::StepError;
 use crate::state::State;
+use crate::step::equations::StepEquations;
 use crate::step::given::{Drives, Step};
 use crate::step::problem::Problem;
 use crate::step::statistics::Statistics;
@@ -17,6 +18,8 @@ use crate::step::unknowns::Unknowns;
 const MOST_CORRECTIONS: usize = 10;
 const SETTLED: f64 = 1e-4;
 const GOOD: f64 = 1e-2;
+/// Relative residual that their linear systems may leave.
+const LINEAR: f64 = 1e-3;
 /// Part of the last step over which the interpolated velocity is differenced to an acceleration.
 const DIFFERENCE: f64 = 1e-3;
 
@@ -37,13 +40,12 @@ impl Simulation {
             if configuration.update(&self.model.network, &state.q, &state.frames, &shafts) {
                 configuration.accept(&mut state.frames);
                 self.settle(&mut state);
-                self.forget_fluid();
             }
         }
         Ok(state)
     }
 
-    pub(crate) fn interpolated(&self, time: f64) -> Result<State, StepError> {
+    pub(super) fn interpolated(&self, time: f64) -> Result<State, StepError> {
         let mut state = self.state.clone();
         let (past, now) = (&self.state.history, self.state.time);
         let order = past.past.len().min(state.control.order + 1);
@@ -69,8 +71,31 @@ impl Simulation {
         Ok(state)
     }
 
-    /// Brings an interpolated state into balance, the forces on the fluid being what they are up to the change of rates. Without
-    /// success it stays as it is.
+    /// Shows `look` the present state, brought into the balance of forces where steps of adaptive size have only found positions: its
+    /// tensions, torques and forces on the fluid are then those of that balance. The state itself stays as it is.
+    ///
+    /// # Errors
+    /// As [`Self::state_at`].
+    pub fn balanced<R>(&mut self, look: impl FnOnce(&mut Self) -> R) -> Result<R, StepError> {
+        if self.tolerance.is_none() {
+            return Ok(look(self));
+        }
+        let state = self.state_at(self.state.time)?;
+        Ok(self.look_at(state, look))
+    }
+
+    /// Shows `look` another state in place of the present one.
+    pub fn look_at<R>(&mut self, state: State, look: impl FnOnce(&mut Self) -> R) -> R {
+        let present = std::mem::replace(&mut self.state, state);
+        self.anchor_contact();
+        let seen = look(self);
+        self.state = present;
+        self.anchor_contact();
+        seen
+    }
+
+    /// Brings an interpolated state into balance, with the fluid's equation at its own geometry: nothing that earlier steps have left
+    /// behind may matter, or runs that go on from a file would show other frames. Without success it stays as it is.
     fn settle(&mut self, state: &mut State) {
         let Goal::Correction(goal) = self.settings.goal else { return };
         if self.force.is_some() {
@@ -112,37 +137,34 @@ impl Simulation {
         }
     }
 
-    /// Newton's method on the balance of forces, but for the fluid's equation, which needs the fluid's matrix there.
+    /// Newton's method on the balance of forces.
     fn correct(&mut self, step: &Step, found: &mut Unknowns, goal: f64) -> Option<()> {
+        self.fluid_step = None;
         let Self { model, solver, .. } = self;
-        let problem = Problem::new(model, step);
         let mut uncounted = Statistics::default();
-        if solver.medium.flow.model_mut().is_some_and(|fluid| fluid.is_local()) {
-            solver.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
-        }
-        // What else has moved the fluid since the step, such as a read-out or a restart, must not show.
-        solver.return_fluid(&step.state.fluid_nodes, &mut uncounted).ok()?;
+        solver.place_fluid(&step.state.positions(&model.network), &mut uncounted).ok()?;
         solver.begin(model, step, &mut uncounted).ok()?;
+        let problem = Problem::new(model, step);
+        let mut equations = StepEquations { problem, solver, statistics: &mut uncounted };
+        equations.aim(Goal::Correction(goal), found);
         let (mut direction, mut left) = (found.clone(), f64::INFINITY);
         for _ in 0..MOST_CORRECTIONS {
-            solver.evaluate(problem, found, &mut uncounted)?;
-            solver.forget_slip();
-            solver.linearize(problem, &found.tensions, &mut uncounted).ok()?;
-            left = solver.correction(problem, goal, &mut uncounted).ok()?.length;
-            solver.last_correction(problem, &found.tensions, &mut direction).ok()?;
-            let from = found.q.clone();
-            let parts = [(&mut found.q, &direction.q), (&mut found.density, &direction.density)];
-            for (value, change) in parts.into_iter().chain([(&mut found.tensions, &direction.tensions)]) {
-                value.iter_mut().zip(change).for_each(|(value, change)| *value += change);
-            }
-            if solver.step_limit(&from, &found.q, &mut uncounted) < 1.0 {
+            equations.evaluate(found)?;
+            equations.weigh();
+            equations.linearize(found).ok()?;
+            // What friction still has to slide does not count: a contact that sticks shows the stresses that it has.
+            left = equations.solver.correction(problem, goal, equations.statistics).ok()?.length;
+            equations.direction(found, LINEAR, &mut direction).ok()?;
+            let from = found.clone();
+            equations.advance(&from, &direction, 1.0, found);
+            if equations.longest_step(&from, found) < 1.0 {
                 return None;
             }
             if left <= SETTLED * goal {
                 break;
             }
         }
-        (left <= GOOD * goal && problem.place(&found.q, &mut solver.at)).then_some(())
+        (left <= GOOD * goal && equations.place(found)).then_some(())
     }
 
     /// Torques of torque-driven motors, N m, unless one of their functions fails.

@@ -19,6 +19,9 @@ use crate::step::solver::Solver;
 /// the mobility 3.5 GB.
 const MOST_RESISTANCES: usize = 4000;
 
+/// Distance, in sizes of a filament, within which a node stands on an edge.
+const COINCIDENT: f64 = 1e-7;
+
 impl Simulation {
     /// Energies of all terms that have one, J, by name; none where the state is no configuration.
     pub fn energies(&mut self) -> Vec<(&'static str, f64)> {
@@ -154,6 +157,25 @@ impl Simulation {
             out[3 * node..3 * node + 3].copy_from_slice(value);
         }
         Ok(out)
+    }
+
+    /// An immersed node that stands on an edge it is no end of, to a ten-millionth of the size of its filament, and that edge.
+    pub(crate) fn coincidence(&self) -> Option<[usize; 2]> {
+        let Model { network, error_weight, .. } = &*self.model;
+        let positions = self.positions();
+        self.solver.medium.flow.dofs().iter().find_map(|&dof| {
+            let point = network.node_dofs().partition_point(|&first| first < dof);
+            let reach = COINCIDENT / error_weight[dof];
+            let on = |&(_, &[a, b]): &(usize, &[usize; 2])| {
+                if a == point || b == point {
+                    return false;
+                }
+                let (along, arm) = (positions[b] - positions[a], positions[point] - positions[a]);
+                let part = (arm.dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+                (arm - along * part).norm() < reach
+            };
+            network.edges().iter().enumerate().find(on).map(|(edge, _)| [point, edge])
+        })
     }
 
     /// Positions of the nodes, m.

@@ -53,11 +53,16 @@ pub enum FrameError {
 }
 
 impl Simulation {
-    /// The present frame.
+    /// The present frame, in the balance of forces.
     ///
     /// # Errors
     /// [`FrameError`] if a motor's function fails or the fluid's matrix is singular.
     pub fn frame(&mut self) -> Result<Frame, FrameError> {
+        self.balanced(Self::seen)?
+    }
+
+    /// The frame of the state as it is.
+    fn seen(&mut self) -> Result<Frame, FrameError> {
         let motor_speeds = self.motor_speeds().map_err(StepError::Signal)?;
         let force_density = self.force_density()?;
         let motor_torques = self.motor_torques();
@@ -89,11 +94,7 @@ impl Simulation {
     /// # Errors
     /// As [`Self::frame`].
     pub fn frame_at(&mut self, time: f64) -> Result<Frame, FrameError> {
-        let present = self.state().clone();
         let then = self.frame_state(time)?;
-        self.restore(then);
-        let frame = self.frame();
-        self.restore(present);
-        frame
+        self.look_at(then, Self::seen)
     }
 }

@@ -37,10 +37,6 @@ impl State {
         self.check_history(dofs, flow)?;
         self.check_frames(edges)?;
         self.check_contacts(model)?;
-        if !self.fluid_nodes.is_empty() {
-            length("state.fluid_nodes", self.fluid_nodes.len(), model.network().node_count())?;
-        }
-        self.fluid_nodes.iter().try_for_each(|node| finite("state.fluid_nodes", node.as_slice()))?;
         length("state.clamp_reactions", self.reactions.len(), model.clamps.len())?;
         self.reactions.iter().try_for_each(|reaction| finite("state.clamp_reactions", &reaction.numbers()))
     }

@@ -48,8 +48,6 @@ pub struct State {
     pub account: Account,
     /// Positions of the nodes, m, where barrier contact has listed its near pairs; empty without.
     pub contact_anchor: Vec<Vec3>,
-    /// Positions of the nodes, m, at which the last step took the fluid's geometry; empty unless the fluid is nonlocal.
-    pub fluid_nodes: Vec<Vec3>,
     /// What every clamp exerted in the last step.
     pub reactions: Vec<Reaction>,
 }
@@ -75,7 +73,6 @@ impl State {
             contacts: Vec::new(),
             account: Account::default(),
             contact_anchor: Vec::new(),
-            fluid_nodes: Vec::new(),
             reactions: vec![Reaction::default(); model.clamps.len()],
         };
         let mut configuration = Configuration::new(network, model.dof_count());

@@ -3,6 +3,7 @@
 use rayon::ThreadPool;
 
 use crate::fluid::FluidModel;
+use crate::kinematics::points::{Nodes, Points};
 use crate::linear::LinearError;
 use crate::model::Model;
 use crate::step::given::Step;
@@ -12,8 +13,7 @@ use crate::{Mat3, Vec3};
 /// The drag model with its memory; none in a dry scene.
 pub(crate) struct Flow {
     fluid: Option<Box<dyn FluidModel>>,
-    dofs: Vec<usize>,
-    placed: Vec<Vec3>,
+    nodes: Nodes,
     /// Velocities of the immersed nodes relative to the background, then forces on the fluid.
     pub values: Vec<f64>,
     /// The force of the velocities at the beginning of the step, where the fluid is explicit, N.
@@ -23,9 +23,9 @@ pub(crate) struct Flow {
 impl Flow {
     /// A fresh one for a model.
     pub fn new(model: &Model) -> Result<Self, LinearError> {
-        let dofs = model.storage.fluid_dofs.clone();
-        let values = vec![0.0; 3 * dofs.len()];
-        Ok(Self { fluid: model.fluid()?, dofs, placed: Vec::new(), values, constant: vec![0.0; model.dof_count] })
+        let nodes = Nodes::new(model.storage.fluid_dofs.clone());
+        let values = vec![0.0; 3 * nodes.count()];
+        Ok(Self { fluid: model.fluid()?, nodes, values, constant: vec![0.0; model.dof_count] })
     }
 
     /// The drag model at the geometry of the last [`Self::place`].
@@ -37,13 +37,13 @@ impl Flow {
     pub fn implicit_nonlocal(&mut self, step: &Step) -> Option<(&mut (dyn FluidModel + 'static), &[usize])> {
         let implicit = step.scheme.fluid_is_implicit();
         let fluid = self.fluid.as_deref_mut().filter(|fluid| implicit && !fluid.is_local())?;
-        Some((fluid, &self.dofs))
+        Some((fluid, self.nodes.dofs()))
     }
 
     /// The drag model, if it resists the new velocities, and the degrees of freedom of its nodes.
     pub fn implicit(&mut self, step: &Step) -> Option<(&mut (dyn FluidModel + 'static), &[usize])> {
         let implicit = step.scheme.fluid_is_implicit();
-        Some((self.fluid.as_deref_mut().filter(|_| implicit)?, &self.dofs))
+        Some((self.fluid.as_deref_mut().filter(|_| implicit)?, self.nodes.dofs()))
     }
 
     /// Whether it is nonlocal.
@@ -51,9 +51,14 @@ impl Flow {
         self.fluid.as_ref().is_some_and(|fluid| !fluid.is_local())
     }
 
+    /// The immersed nodes.
+    pub fn nodes(&self) -> &Nodes {
+        &self.nodes
+    }
+
     /// Degrees of freedom of the immersed nodes.
     pub fn dofs(&self) -> &[usize] {
-        &self.dofs
+        self.nodes.dofs()
     }
 
     /// The force of an explicit fluid, N.
@@ -63,26 +68,17 @@ impl Flow {
 
     /// Moves to a geometry.
     pub fn place(&mut self, positions: &[Vec3], pool: Option<&ThreadPool>) -> Result<(), LinearError> {
-        self.placed.clear();
-        let Some(fluid) = &mut self.fluid else { return Ok(()) };
-        fluid.update(positions, pool)?;
-        self.placed.extend_from_slice(positions);
-        Ok(())
-    }
-
-    /// Positions of the nodes, m, at the geometry of the last [`Self::place`].
-    pub fn placed(&self) -> &[Vec3] {
-        &self.placed
+        self.fluid.as_mut().map_or(Ok(()), |fluid| fluid.update(positions, pool))
     }
 
     /// Finds the force of the velocities at the beginning of a step, if it is explicit.
     pub fn begin(&mut self, step: &Step, pool: Option<&ThreadPool>) -> Result<(), LinearError> {
         self.constant.fill(0.0);
         if let Some(fluid) = self.fluid.as_mut().filter(|_| !step.scheme.fluid_is_implicit()) {
-            gather(&self.dofs, |dof| step.state.velocity[dof], &mut self.values);
+            self.nodes.velocities(&|dof| step.state.velocity[dof], &mut self.values);
             subtract_background(step, fluid.immersed(), &mut self.values);
             fluid.resist(&mut self.values, pool)?;
-            scatter(&self.dofs, &self.values, &mut self.constant);
+            self.nodes.add_forces(&self.values, &mut self.constant);
         }
         Ok(())
     }
@@ -97,7 +93,7 @@ impl Flow {
     ) -> Result<(), LinearError> {
         let Some(fluid) = self.fluid.as_mut().filter(|_| step.scheme.fluid_is_implicit()) else { return Ok(()) };
         let increment = step.increment();
-        gather(&self.dofs, |dof| increment.rate_of(dof, trial.q[dof]), &mut self.values);
+        self.nodes.velocities(&|dof| increment.rate_of(dof, trial.q[dof]), &mut self.values);
         subtract_background(step, fluid.immersed(), &mut self.values);
         match fluid.nonlocal() {
             None => fluid.resist(&mut self.values, pool)?,
@@ -108,7 +104,7 @@ impl Flow {
                 mobility.weigh(&trial.density, &mut self.values);
             }
         }
-        scatter(&self.dofs, &self.values, residual);
+        self.nodes.add_forces(&self.values, residual);
         Ok(())
     }
 
@@ -129,7 +125,7 @@ impl Flow {
             mobility.weigh(density, &mut self.values);
             return;
         }
-        gather(&self.dofs, |dof| velocity[dof], &mut self.values);
+        self.nodes.velocities(&|dof| velocity[dof], &mut self.values);
         subtract_background(step, fluid.immersed(), &mut self.values);
         if fluid.resist(&mut self.values, pool).is_err() {
             self.values.fill(0.0);
@@ -157,19 +153,5 @@ fn subtract_background(step: &Step, immersed: &[usize], velocities: &mut [f64]) 
     let background = ambient.background().node_velocities;
     for (&node, velocity) in immersed.iter().zip(velocities.chunks_exact_mut(3)) {
         (0..3).for_each(|c| velocity[c] -= background[node][c]);
-    }
-}
-
-/// Three values a node, from their first degrees of freedom.
-fn gather(dofs: &[usize], value: impl Fn(usize) -> f64, out: &mut [f64]) {
-    for (&dof, chunk) in dofs.iter().zip(out.chunks_exact_mut(3)) {
-        (0..3).for_each(|c| chunk[c] = value(dof + c));
-    }
-}
-
-/// Adds three values a node to its degrees of freedom.
-pub(crate) fn scatter(dofs: &[usize], values: &[f64], out: &mut [f64]) {
-    for (&dof, chunk) in dofs.iter().zip(values.chunks_exact(3)) {
-        (0..3).for_each(|c| out[dof + c] += chunk[c]);
     }
 }

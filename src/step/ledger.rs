@@ -6,13 +6,13 @@
 
 use crate::Vec3;
 use crate::forces::motors::Drive;
+use crate::kinematics::points::Points;
 use crate::model::Model;
 use crate::rod::assembly::Assembly;
 use crate::rod::configuration::node;
 use crate::rod::term::{External, Purpose, TermError};
 use crate::state::account::{Account, CHANNELS, CLAMPS, CONTACT, FLUID, GRAVITY, HEAD, LOADS, MOTORS, OTHER, TWIST};
 use crate::step::contact::Treatment;
-use crate::step::flow::scatter;
 use crate::step::given::Step;
 use crate::step::solver::Solver;
 
@@ -105,7 +105,7 @@ impl Solver {
             return dot(flow.constant(), velocity);
         }
         flow.find_forces(step, (velocity, density), pool.as_deref());
-        scatter(flow.dofs(), &flow.values, outer);
+        flow.nodes().add_forces(&flow.values, outer);
         let parts = flow.dofs().iter().zip(flow.values.chunks_exact(3));
         parts.map(|(&dof, force)| dot(force, &velocity[dof..dof + 3])).sum()
     }

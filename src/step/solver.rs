@@ -88,23 +88,6 @@ impl Solver {
         done
     }
 
-    /// Moves a nonlocal fluid to where it was in a step, unless it stands there.
-    pub fn return_fluid(&mut self, positions: &[Vec3], statistics: &mut Statistics) -> Result<(), LinearError> {
-        let flow = &self.medium.flow;
-        if flow.is_nonlocal() && !positions.is_empty() && flow.placed() != positions {
-            return self.place_fluid(positions, statistics);
-        }
-        Ok(())
-    }
-
-    /// Writes down where a nonlocal fluid stands.
-    pub fn keep_fluid_nodes(&self, out: &mut Vec<Vec3>) {
-        out.clear();
-        if self.medium.flow.is_nonlocal() {
-            out.extend_from_slice(self.medium.flow.placed());
-        }
-    }
-
     /// Prepares a step: the fluid's force, if it is that of the last velocities, and what contact takes from its beginning.
     pub fn begin(&mut self, model: &Model, step: &Step, statistics: &mut Statistics) -> Result<(), LinearError> {
         let start = Instant::now();
@@ -191,11 +174,6 @@ impl Solver {
 
     fn size(&self, model: &Model) -> Size {
         self.targets.size(model, &self.at.residual, &self.at.slip, self.medium.flow.dofs())
-    }
-
-    /// Takes the fluid's equation for solved.
-    pub fn forget_slip(&mut self) {
-        self.at.slip.fill(0.0);
     }
 
     /// Residual at a trial; `None` if there is none, for the reason that [`Self::unbalanced`] tells.

@@ -65,7 +65,8 @@ impl Targets {
             }
         }
         let inertia = if step.scheme.has_inertia() { step.rate * step.rate } else { 0.0 };
-        model.round_off.floors(model, (step.rate, inertia), &self.drag, q, &mut self.floor);
+        let known = (&self.drag[..], &step.state.frames.twists[..]);
+        model.round_off.floors(model, (step.rate, inertia), known, q, &mut self.floor);
     }
 
     fn target(&self, model: &Model, dof: usize) -> f64 {

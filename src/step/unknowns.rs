@@ -1,5 +1,7 @@
 //! The unknowns of a step.
 
+use crate::kinematics::manifold::{Manifold, VectorSpace};
+
 /// A trial solution: degrees of freedom, the force density on the fluid if that is nonlocal and implicit, and the tensions of edges as
 /// Newton's method sees them, linear from iterate to iterate.
 #[derive(Debug, Clone, Default)]
@@ -15,25 +17,20 @@ pub struct Unknowns {
 impl Unknowns {
     /// Sets these to what is `part` of the way from others along a direction.
     pub fn advance(&mut self, from: &Self, direction: &Self, part: f64) {
-        let go = |from: &[f64], direction: &[f64], out: &mut [f64]| {
-            for ((out, from), direction) in out.iter_mut().zip(from).zip(direction) {
-                *out = from + part * direction;
-            }
-        };
-        go(&from.q, &direction.q, &mut self.q);
-        go(&from.density, &direction.density, &mut self.density);
-        go(&from.tensions, &direction.tensions, &mut self.tensions);
+        space(&self.q).retract(&from.q, &direction.q, part, &mut self.q);
+        space(&self.density).retract(&from.density, &direction.density, part, &mut self.density);
+        space(&self.tensions).retract(&from.tensions, &direction.tensions, part, &mut self.tensions);
     }
 
     /// Sets these to the direction that leads from one to another.
     pub fn difference(&mut self, from: &Self, to: &Self) {
-        let apart = |from: &[f64], to: &[f64], out: &mut [f64]| {
-            for ((out, from), to) in out.iter_mut().zip(from).zip(to) {
-                *out = to - from;
-            }
-        };
-        apart(&from.q, &to.q, &mut self.q);
-        apart(&from.density, &to.density, &mut self.density);
-        apart(&from.tensions, &to.tensions, &mut self.tensions);
+        space(&self.q).difference(&from.q, &to.q, &mut self.q);
+        space(&self.density).difference(&from.density, &to.density, &mut self.density);
+        space(&self.tensions).difference(&from.tensions, &to.tensions, &mut self.tensions);
     }
+}
+
+/// The space of these unknowns: every degree of freedom of today is a number.
+fn space(values: &[f64]) -> VectorSpace {
+    VectorSpace(values.len())
 }

@@ -17,7 +17,7 @@ def test_a_callback_sees_every_frame_at_its_time(options: dict[str, float]) -> N
 
     def look(simulation: Simulation) -> None:
         seen.append(simulation.time)
-        nodes.append(simulation.nodes)
+        nodes.append(simulation.frame()["nodes"])
 
     trajectory = Simulation(ROBOT, threads=1, **options).run(0.5, 0.1, path=False, callback=look)
     assert seen == list(trajectory.time[1:])
@@ -52,7 +52,7 @@ def test_true_stops_a_run_at_the_present_instant(
         callback_every=every,  # type: ignore[arg-type]
     )
     assert 0.33 < simulation.time < 1.0 and trajectory.time[-1] == simulation.time
-    assert np.array_equal(trajectory.nodes[-1], simulation.nodes)
+    assert np.array_equal(trajectory.nodes[-1], simulation.frame()["nodes"])
     again = Simulation.restore(tmp_path / "run.h5")
     assert again.time == simulation.time
     again.run(1.5, 0.1, path=tmp_path / "run.h5")

@@ -72,7 +72,7 @@ def test_set_changes_parameters_of_a_scenario() -> None:
 
 def test_set_changes_fields_of_a_file(tmp_path: Path) -> None:
     scenarios.cantilever().to_toml(tmp_path / "scene.toml")
-    scene = cli.scene_from(str(tmp_path / "scene.toml"), ["fluid.viscosity=2.5", "clamps.0.nodes=[0]"])
+    scene = cli.scene_from(str(tmp_path / "scene.toml"), ["fluid.viscosity=2.5", "clamps[0].nodes=[0]"])
     assert scene.fluid == Fluid(viscosity=2.5, model="RFT") and scene.clamps[0].nodes == (0,)
     for wrong in ("clamps.7.nodes=[0]", "name.first=1"):
         with pytest.raises(SceneError, match=wrong.partition("=")[0]):

@@ -337,3 +337,11 @@ def test_velocities_of_an_instant_are_no_reynolds_number():
         simulation.step(10)
     (notice,) = [notice for notice in simulation.warnings if notice.kind == "reynolds"]
     assert 0.3 * soon < notice.value < soon
+
+
+def test_a_scene_at_rest_makes_and_loses_no_energy_to_speak_of():
+    scene = flagrs.scenarios.straight_rod().replace(fluid=None)
+    simulation = flagrs.Simulation(scene, scheme="implicit", rtol=1e-3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulation.step(3)

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fake_simulation import SPEED, FakeSimulation
-from flagrs import FileError, FlagrsError, SceneError, cli, plot, scenarios
-from flagrs.commands import movie as command
+from flagrs import FileError, FlagrsError, SceneError, cli, plot, runs, scenarios
 from flagrs.plot.movie import view_from
 from flagrs.recorder import Recorder
 from flagrs.trajectory import Trajectory
@@ -99,7 +98,7 @@ def test_the_movie_of_the_geometries_is_one_command(
         ran.append((round(scene.fluid.wavelength / 6.36e-3, 6), path.name, settings.until))
         return type("Run", (), {"trajectory": FakeSimulation(scene).run(1.0, 0.5)})
 
-    monkeypatch.setattr(command, "run_to_file", run)
+    monkeypatch.setattr(runs, "run_to_file", run)
     arguments = ["flagrs", "movie", "geometries", "-o", "m.gif", "--seconds", "0.2", "--until", "5"]
     monkeypatch.setattr(sys, "argv", arguments)
     with pytest.raises(SystemExit) as ended:

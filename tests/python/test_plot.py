@@ -233,5 +233,7 @@ def test_failed_runs_are_left_out_of_a_study() -> None:
     rows = study_rows()
     rows[0].update(swimming_speed=None, head_rate=None)
     assert len(drawn(plot.study(rows, "nodes"))[0].get_lines()[1].get_xdata()) == 1
+    with pytest.raises(FlagrsError, match=r"rows\[0\]: no swimming_speed, head_rate, nodes"):
+        plot.study([{"rpm": 3.0}], "nodes")
     with pytest.raises(FlagrsError, match="no run"):
         plot.study(rows[:1], "nodes")

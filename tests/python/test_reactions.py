@@ -106,7 +106,8 @@ def test_clamped_flagella_tell_thrust_and_torque(model: str) -> None:
         spun = ((drag * rates)[:, None] * vectors / np.linalg.norm(vectors, axis=1)[:, None]).sum(axis=0)
     torque = np.cross(arms, moved).sum(axis=0) + spun
     np.testing.assert_allclose(last.torque, torque, atol=5e-3 * np.abs(torque).max())
-    assert last.power == pytest.approx(trajectory.powers()["clamps"][-1], rel=1e-9)
+    # The account is that of the end of the step, which stops at the error of positions, 1e-5.
+    assert last.power == pytest.approx(trajectory.powers()["clamps"][-1], rel=1e-6)
 
 
 def test_powers_of_every_driver_add_up() -> None:

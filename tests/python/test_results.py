@@ -24,6 +24,7 @@ from flagrs import (
     scenarios,
 )
 from flagrs.recorder import Recorder
+from flagrs.results import readouts
 from flagrs.results.knotting import linking, writhe
 from flagrs.results.strain import curvatures, tensions, twists
 from flagrs.results.swimming import Estimate, rate_of
@@ -179,6 +180,24 @@ def test_gaps_and_tips_of_two_straight_filaments_are_those_of_their_lines() -> N
     assert bundle.gap() == pytest.approx(np.full((3, 1), 3e-3), rel=1e-9)
     assert bundle.tip_spread() == pytest.approx(np.full(3, 2.5e-3), rel=1e-9)
     assert bundle.linking() == pytest.approx(np.zeros((3, 1)), abs=1e-12)
+
+
+def test_gaps_of_several_filaments_are_pair_by_pair() -> None:
+    rods = tuple(
+        Rod.straight(length=0.1, edge_count=10, radius=1e-3, material=SILICONE, start=(0.0, y, 0.0))
+        for y in (0.0, 9e-3, 4e-3)
+    )
+    bundle = FakeSimulation(Scene(rods=rods, fluid=Fluid(viscosity=1.0))).run(1.0, 1.0).bundle([0])
+    assert bundle.pairs == [(0, 1), (0, 2), (1, 2)]
+    assert bundle.gap()[0] == pytest.approx([7e-3, 2e-3, 3e-3], rel=1e-9)
+
+
+def test_windings_of_many_edges_are_left_to_be_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(readouts, "MOST_PAIRS", 1000)
+    found = FakeSimulation(pair_of_helices(0.3)).run(2.0, 0.1).readouts()
+    for name in ("writhe", "linking", "filament_gap"):
+        assert found[name].estimate is None and "take long" in found[name].absent
+    assert found["tip_spread"].value > 0.0
 
 
 @pytest.mark.parametrize("flipped", [(), (3,), (0, 4, 9)])

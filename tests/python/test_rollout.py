@@ -74,7 +74,7 @@ def test_steps_and_inputs_without_states() -> None:
     single = Simulation(ROBOT, threads=1)
     single.motors[0].speed, single.motors[1].speed = 2.0, -2.0
     single.step(4)
-    assert np.array_equal(found.nodes[1, 0], single.nodes)
+    assert np.array_equal(found.nodes[1, 0], single.frame()["nodes"])
     assert found.scenes[1].motors[1].speed == -2.0
 
 

@@ -7,8 +7,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from flagrs.trajectory import Trajectory
-
 
 def export(
     file: Annotated[Path, typer.Argument(help="HDF5 file of a run, finished or not.")],
@@ -23,6 +21,7 @@ def export(
     """Write a run in a format of other programs."""
     from flagrs.export import FORMATS  # the other commands do without
     from flagrs.export import export as write
+    from flagrs.trajectory import Trajectory  # help does without
 
     path = output or file.with_suffix(FORMATS[to].suffix)
     for written in write(Trajectory.load(file), to, path):

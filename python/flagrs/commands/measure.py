@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-from flagrs.trajectory import Trajectory
-
 
 def measure(
     file: Annotated[Path, typer.Argument(help="HDF5 file of a run, finished or not.")],
@@ -18,4 +16,6 @@ def measure(
     end: Annotated[float | None, typer.Option(help="End of the window [s].")] = None,
 ) -> None:
     """Print what is read off a run: speed, rates, torques, power, measures of bundles, with their errors."""
+    from flagrs.trajectory import Trajectory  # help does without
+
     typer.echo(Trajectory.load(file).readouts(start, end))

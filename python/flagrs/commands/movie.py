@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flagrs import scenarios
 from flagrs.errors import SceneError
-from flagrs.progress import ProgressBar
-from flagrs.runs import RunSettings, run_to_file
-from flagrs.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from flagrs.trajectory import Trajectory
 
 #: What stands for the runs of the supplementary text's movie, their pitches over the radius, and where they
 #: go.
@@ -43,6 +42,8 @@ def movie(
     """Make a movie of runs."""
     from flagrs.plot.film_strip import encoder_for  # matplotlib takes a while
     from flagrs.plot.movie import movie as write
+    from flagrs.progress import ProgressBar
+    from flagrs.trajectory import Trajectory
 
     encoder_for(output)  # says what is wrong before anything runs
     labels = list(label) if label else None
@@ -70,16 +71,19 @@ def movie(
 
 def _geometries(until: float) -> list[Trajectory]:
     """Return the robot's runs with each pitch, of files that are there or after running them."""
+    from flagrs import runs, scenarios
+    from flagrs.progress import ProgressBar
+
     FOLDER.mkdir(parents=True, exist_ok=True)
-    settings = RunSettings(until=until, save_every=0.1, rtol=1e-3)
-    runs = []
+    settings = runs.RunSettings(until=until, save_every=0.1, rtol=1e-3)
+    shown = []
     for pitch in PITCHES:
         path = FOLDER / f"pitch-{pitch:g}.h5"
         title = f"pitch {pitch:g}"
         with ProgressBar(until, title, hidden=not sys.stderr.isatty()) as progress:
-            runs.append(
-                run_to_file(
+            shown.append(
+                runs.run_to_file(
                     scenarios.robot(normalized_pitch=pitch), path, settings, progress=progress
                 ).trajectory
             )
-    return runs
+    return shown

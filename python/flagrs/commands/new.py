@@ -7,13 +7,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
-import tomli_w
 import typer
 
-from flagrs import scenarios
 from flagrs.errors import FileError, SceneError, file_error
 from flagrs.files import check_output
-from flagrs.scene.schema import meanings_of, scene_schema
 
 
 def new(
@@ -37,6 +34,8 @@ def new(
 
 def schema() -> None:
     """Print the JSON Schema of scene files, for editors that complete and check TOML."""
+    from flagrs.scene.schema import scene_schema  # help does without
+
     typer.echo(json.dumps(scene_schema(), indent=1))
 
 
@@ -46,6 +45,9 @@ def _template() -> str:
 
 def _of_scenario(name: str) -> str:
     """Return a file with all parameters of a scenario, at their defaults, and what they mean."""
+    from flagrs import scenarios  # help does without
+    from flagrs.scene.schema import meanings_of
+
     summary, defaults = scenarios.list().get(name), scenarios.parameters(name)
     meanings = meanings_of(getattr(scenarios, name), "Parameters")
     lines = [
@@ -61,5 +63,7 @@ def _of_scenario(name: str) -> str:
 
 
 def _line(key: str, value: Any) -> str:
+    import tomli_w
+
     plain = list(value) if isinstance(value, tuple) else value
     return tomli_w.dumps({key: plain}).rstrip("\n")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from flagrs.errors import FileError, SceneError, file_error, not_allowed
-from flagrs.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from flagrs.trajectory import Trajectory
 
 Kind = Literal["summary", "speed", "shape", "flow", "curvature", "tension", "bundle"]
 Size = Literal["screen", "column", "page"]
@@ -32,6 +34,8 @@ def plot(
     plane: Annotated[Literal["xy", "xz", "yz"], typer.Option(help="Plane of a flow.")] = "xy",
 ) -> None:
     """Draw a run: summary, speed, shape, flow in a plane, curvature and tension over time, or the bundle."""
+    from flagrs.trajectory import Trajectory  # help does without
+
     name = f"{file.stem}.png" if kind == "summary" else f"{file.stem}-{kind}.png"
     image = output or file.with_name(name)
     check_image(image)

@@ -9,8 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from flagrs.trajectory import Trajectory
-
 
 def view(
     file: Annotated[Path, typer.Argument(help="HDF5 file of a run, finished or not.")],
@@ -27,6 +25,8 @@ def view(
     ] = None,
 ) -> None:
     """Make a page that shows a run in three dimensions, in any browser and without a network."""
+    from flagrs.trajectory import Trajectory  # help does without
+
     options: dict[str, Any] = {"colour": colour, "follow": follow, "play": play, "megabytes": megabytes}
     page = Trajectory.load(file).view(**options)
     path = page.save(output or file.with_suffix(".html"))

@@ -32,8 +32,12 @@ def study(rows: Sequence[Mapping[str, Any]], by: str, label: str = "{}") -> Figu
     Raises
     ------
     FlagrsError
-        If no row has a speed.
+        If no row has a speed, or one lacks a column.
     """
+    for number, row in enumerate(rows):
+        missing = [name for name in ("rpm", "swimming_speed", "head_rate", by) if name not in row]
+        if missing:
+            raise FlagrsError(f"rows[{number}]: no {', '.join(missing)}; the columns are {', '.join(row)}")
     usable = [row for row in rows if row["swimming_speed"] is not None]
     if not usable:
         raise FlagrsError("no run of the study has a speed to draw")

@@ -85,18 +85,19 @@ class Bundle:
         Gaps beyond a tenth of the filaments' length are cut off there.
         """
         self._need(2, "a gap between filaments")
-        scene = self.trajectory.scene
-        reach = 0.1 * max(float(np.linalg.norm(np.diff(self.curve(0)[0], axis=0), axis=1).sum()), 0.0)
-        measured = [EdgeGaps(scene, reach, owner=self._owners(a, b)) for a, b in self.pairs]
-        frames = self.trajectory.nodes[self.frames]
-        gaps: FloatArray = np.array([[pair.at(nodes).min() for pair in measured] for nodes in frames])
-        return gaps
-
-    def _owners(self, a: int, b: int) -> IntArray:
-        """Return 0 and 1 for the edges (E,) of two filaments, -1 for all others."""
-        owner = np.full(self.trajectory.scene.edge_count, -1)
-        owner[self.filaments[a].edges], owner[self.filaments[b].edges] = 0, 1
-        return owner
+        scene, count = self.trajectory.scene, len(self.filaments)
+        owner = np.full(scene.edge_count, -1)
+        for number, path in enumerate(self.filaments):
+            owner[path.edges] = number
+        reach = 0.1 * max(_length(self.curve(number)[0]) for number in range(count))
+        near = EdgeGaps(scene, reach, owner)
+        found = np.full((len(self.frames), count, count), reach)
+        for row, nodes in zip(found, self.trajectory.nodes[self.frames], strict=True):
+            pairs, gaps = near.pairs(nodes)
+            both = np.sort(owner[pairs], axis=1)
+            np.minimum.at(row, (both[:, 0], both[:, 1]), gaps)
+        first, second = np.array(self.pairs).T
+        return found[:, first, second]
 
     def tip_spread(self) -> FloatArray:
         """Return the root mean square distance (T,) of the tips from their middle [m]."""
@@ -179,6 +180,17 @@ class Bundle:
         """Return the writhe (T, F) of every filament [1]; see `flagrs.results.knotting.writhe`."""
         columns = [[writhe(shape) for shape in self.curve(k)] for k in range(len(self.filaments))]
         return np.array(columns).T
+
+    @property
+    def linking_cost(self) -> int:
+        """How many pairs of edges `linking` integrates over in a frame, some microseconds each."""
+        sizes = [len(path.edges) for path in self.filaments]
+        return sum(sizes[a] * sizes[b] for a, b in self.pairs)
+
+    @property
+    def writhe_cost(self) -> int:
+        """How many pairs of edges `writhe` integrates over in a frame, some microseconds each."""
+        return sum(len(path.edges) ** 2 // 2 for path in self.filaments)
 
     def linking(self) -> FloatArray:
         """Return how often every two filaments wind about each other (T, F (F - 1) / 2) [1].

@@ -48,14 +48,19 @@ class EdgeGaps:
     def at(self, nodes: FloatArray) -> FloatArray:
         """Return the smallest gap (E,) of every edge in a shape (N, 3) [m]; negative where edges overlap."""
         gaps = np.full(len(self._edges), self.reach)
-        pairs = self._candidates(nodes)
-        if len(pairs):
-            a, b = self._edges[pairs[:, 0]], self._edges[pairs[:, 1]]
-            distance, _, _ = segment_distance(nodes[a[:, 0]], nodes[a[:, 1]], nodes[b[:, 0]], nodes[b[:, 1]])
-            gap = distance - self._radius[pairs].sum(axis=1)
-            for side in (0, 1):
-                np.minimum.at(gaps, pairs[:, side], gap)
+        pairs, between = self.pairs(nodes)
+        for side in (0, 1):
+            np.minimum.at(gaps, pairs[:, side], between)
         return gaps
+
+    def pairs(self, nodes: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return pairs (K, 2) of edges that may be in reach in a shape (N, 3), and their gaps (K,) [m]."""
+        pairs = self._candidates(nodes)
+        if not len(pairs):
+            return pairs, np.zeros(0)
+        a, b = self._edges[pairs[:, 0]], self._edges[pairs[:, 1]]
+        distance, _, _ = segment_distance(nodes[a[:, 0]], nodes[a[:, 1]], nodes[b[:, 0]], nodes[b[:, 1]])
+        return pairs, distance - self._radius[pairs].sum(axis=1)
 
     def _candidates(self, nodes: FloatArray) -> IntArray:
         """Return the pairs (K, 2) of edges that may be within reach and are no neighbours."""
@@ -64,7 +69,7 @@ class EdgeGaps:
         limit = 2.0 * half + 2.0 * float(self._radius.max()) + self.reach
         colliding = np.flatnonzero(self._colliding)
         near = cKDTree(ends[colliding].mean(axis=1)).query_pairs(limit, output_type="ndarray")
-        pairs: IntArray = colliding[near]
+        pairs: IntArray = colliding[near].reshape(-1, 2)
         if self._owner is not None:
             pairs = pairs[self._owner[pairs[:, 0]] != self._owner[pairs[:, 1]]]
         free: IntArray = pairs[~self._excluded(pairs)]

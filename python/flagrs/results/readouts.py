@@ -19,8 +19,9 @@ from flagrs.scene.values import BoolArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from flagrs.trajectory import Trajectory
 
-#: Frames of a window that measures of bundles look at, evenly spaced.
-MOST_FRAMES = 50
+#: Frames of a window that measures of bundles look at, evenly spaced; and pairs of edges that windings are
+#: integrated over, in all of them, which takes some seconds.
+MOST_FRAMES, MOST_PAIRS = 50, 2_000_000
 
 
 @dataclass(frozen=True)
@@ -187,6 +188,15 @@ def _bundle(trajectory: Trajectory, inside: IntArray, put: _Put) -> None:
     def of(measure: Callable[[Bundle], FloatArray]) -> FloatArray:
         return measure(bundle_of(trajectory, frames))
 
+    def wound(measure: Callable[[Bundle], FloatArray], cost: Callable[[Bundle], int]) -> FloatArray:
+        one = bundle_of(trajectory, frames[:1])
+        most = MOST_PAIRS // max(1, cost(one))
+        if most < 2:
+            raise FlagrsError(
+                f"{cost(one)} pairs of edges a frame take long: ask trajectory.bundle(frames) for it"
+            )
+        return measure(bundle_of(trajectory, frames[:: max(1, -(-len(frames) // most))]))
+
     def smallest() -> Estimate:
         gaps = trajectory.minimum_gap()[inside]
         if not np.isfinite(gaps).any():
@@ -198,7 +208,7 @@ def _bundle(trajectory: Trajectory, inside: IntArray, put: _Put) -> None:
         "filament_gap",
         "smallest gap between two filaments",
         "m",
-        lambda: _exact(float(of(Bundle.gap).min())),
+        lambda: _exact(float(wound(Bundle.gap, lambda one: one.linking_cost).min())),
     )
     put("tip_spread", "distance of the tips from their middle", "m", lambda: _mean(of(Bundle.tip_spread)))
     put(
@@ -208,12 +218,17 @@ def _bundle(trajectory: Trajectory, inside: IntArray, put: _Put) -> None:
         lambda: _mean(_alike(of(Bundle.phase_lag)).max(axis=1)),
     )
     put("twist", "twist of a filament, mean, in turns", "1", lambda: _mean(of(Bundle.twist).mean(axis=1)))
-    put("writhe", "writhe of a filament, mean", "1", lambda: _mean(of(Bundle.writhe).mean(axis=1)))
+    put(
+        "writhe",
+        "writhe of a filament, mean",
+        "1",
+        lambda: _mean(wound(Bundle.writhe, lambda one: one.writhe_cost).mean(axis=1)),
+    )
     put(
         "linking",
         "how often two filaments wind about each other, mean",
         "1",
-        lambda: _mean(of(Bundle.linking).mean(axis=1)),
+        lambda: _mean(wound(Bundle.linking, lambda one: one.linking_cost).mean(axis=1)),
     )
 
 

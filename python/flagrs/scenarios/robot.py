@@ -123,7 +123,7 @@ def _nodes(pitch: float, edge_length: float) -> tuple[FloatArray, int]:
 
 def _speeds(rpm: float | Sequence[float]) -> tuple[float, float]:
     """Return the speeds of the two motors [rad/s]."""
-    both = [rpm, rpm] if isinstance(rpm, int | float) else list(rpm)
+    both = [rpm, rpm] if isinstance(rpm, int | float | str) else list(rpm)
     if len(both) != 2:
         raise not_allowed("rpm", rpm, "one number, or one for each of the 2 motors")
     first, second = (number("rpm", value, Bounds("1/min")) for value in both)

@@ -103,8 +103,9 @@ def _with_lines(
 
 def _is_changed(field: str, changes: Mapping[str, Any]) -> bool:
     """Return whether a field was given from outside the file: ``clamps[0].nodes`` by ``clamps.0.nodes``."""
-    dotted = field.replace("[", ".").replace("]", "")
-    return any(dotted == change or dotted.startswith(f"{change}.") for change in changes)
+    dotted = _dotted(field)
+    given = [_dotted(change) for change in changes]
+    return any(dotted == change or dotted.startswith(f"{change}.") for change in given)
 
 
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
@@ -233,11 +234,16 @@ def _rod(entry: Any, path: str) -> Any:
 
 
 def changed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of a mapping with values changed by dotted path, such as ``fluid.viscosity``."""
+    """Return a copy of a mapping with values changed by path, ``clamps.0.nodes`` or ``clamps[0].nodes``."""
     copy = deepcopy(dict(data))
-    for dotted, value in changes.items():
-        _change(copy, dotted, value)
+    for path, value in changes.items():
+        _change(copy, _dotted(path), value)
     return copy
+
+
+def _dotted(path: str) -> str:
+    """Return a path with list positions between dots: ``clamps.0.nodes`` for ``clamps[0].nodes``."""
+    return re.sub(r"\[(\d+)\]", r".\1", path)
 
 
 def _change(data: dict[str, Any], dotted: str, value: Any) -> None:
