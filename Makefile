@@ -123,7 +123,7 @@ validation: $(VENV)/equipped
 
 bench: $(VENV)/equipped
 	cargo bench --locked
-	set -e; for script in cargo_results kernels steps speed_against_error far_field bundles contact_methods; do \
+	set -e; for script in cargo_results kernels steps speed_against_error far_field bundles contact_methods rollouts; do \
 		$(BIN)/python benches/python/$$script.py --document docs/performance.md; \
 	done
 

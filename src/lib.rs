@@ -23,8 +23,8 @@
 //! * What moves it: [`model`], the constant part of a scene; [`state`], the changing one; [`inputs`], what drives; [`step`], the equations of
 //!   one step; [`simulation`], step after step.
 //! * Imports run one way: `linear, nonlinear, bdf, signal, plane, runtime <- rod, kinematics <- elastic, forces, fluid, contact, body <- model <- state,
-//!   inputs <- step <- simulation <- python`.
-//! * [`simulation::Simulation`] is the way in.
+//!   inputs <- step <- simulation <- rollout <- python`.
+//! * [`simulation::Simulation`] is the way in; [`rollout`] takes many states of one model side by side.
 
 #[cfg(test)]
 extern crate self as flagrs;
@@ -44,6 +44,7 @@ pub mod plane;
 #[cfg(feature = "python")]
 mod python;
 pub mod rod;
+pub mod rollout;
 pub mod runtime;
 pub mod signal;
 pub mod simulation;

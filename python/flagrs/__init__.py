@@ -21,6 +21,8 @@ if TYPE_CHECKING:
         StepWarning,
         StrainWarning,
     )
+    from flagrs.reactions import Reaction
+    from flagrs.rollouts import Rollout, rollout
     from flagrs.scene import (
         Capsule,
         Clamp,
@@ -77,6 +79,11 @@ _PLACES = {
         "StationarityWarning",
         "StepWarning",
         "StrainWarning",
+    ),
+    "flagrs.reactions": ("Reaction",),
+    "flagrs.rollouts": (
+        "Rollout",
+        "rollout",
     ),
     "flagrs.scene": (
         "Capsule",
@@ -135,8 +142,10 @@ __all__ = [
     "Motor",
     "PointLoad",
     "PoiseuilleFlow",
+    "Reaction",
     "ReynoldsWarning",
     "Rod",
+    "Rollout",
     "Rotation",
     "Scene",
     "SceneError",
@@ -155,6 +164,7 @@ __all__ = [
     "contact",
     "fluid",
     "plot",
+    "rollout",
     "rpm",
     "scenarios",
     "suggest",

@@ -48,17 +48,32 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "twisting": np.concatenate([rod.GJ_array() for rod in rods]),
         "natural_curvature": np.concatenate([_natural_curvature(rod) for rod in rods]),
         "natural_twist": np.concatenate([_natural_twist(rod) for rod in rods]),
-        "motors": [_motor(scene, k, motor) for k, motor in enumerate(scene.motors)],
         "head": None if scene.head is None else _head(scene, scene.head),
-        "clamps": [_clamp(scene, k, clamp) for k, clamp in enumerate(scene.clamps)],
-        "loads": native_loads(scene),
-        "magnetism": native_magnetism(scene),
         "walls": [wall.native() for wall in scene.walls],
-        "flows": native_flows(scene),
         "gravity": scene.gravity.tolist(),
         "reynolds": reynolds_per_speed(scene),
         "fluid": None if scene.fluid is None else _fluid(scene, scene.fluid),
         "contact": None if scene.contact is None else _contact(scene, scene.contact),
+        **native_inputs(scene, scene),
+    }
+
+
+def native_inputs(scene: Scene, given: Scene) -> dict[str, Any]:
+    """Return what of `native_scene` may change between steps: motors, clamps, loads, magnetism and flows.
+
+    Parameters
+    ----------
+    scene
+        The scene of the moment.
+    given
+        The scene that the equations were made from, which differs in inputs alone.
+    """
+    return {
+        "motors": [_motor(scene, k, motor) for k, motor in enumerate(scene.motors)],
+        "clamps": [_clamp(scene, k, clamp) for k, clamp in enumerate(scene.clamps)],
+        "loads": native_loads(scene, given),
+        "magnetism": native_magnetism(scene),
+        "flows": native_flows(scene),
     }
 
 

@@ -97,6 +97,11 @@ def given_by_drag(account: FloatArray) -> float:
     return float(-taken[taken < 0.0].sum()) / passed if passed > 0.0 else 0.0
 
 
+def powers_of(accounts: FloatArray) -> dict[str, FloatArray]:
+    """Return the power (T,) through every channel in native accounts (T, 42) [W]."""
+    return dict(zip(SOURCES + SINKS, accounts[:, 10:19].T, strict=True))
+
+
 def statistics_of(account: FloatArray) -> dict[str, float]:
     """Return the numbers of an account (42,) that belong into a run's statistics."""
     budget = budget_of(account[None])

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from flagrs.scene import Scene
     from flagrs.trajectory import Trajectory
 
+#: Clamps that the report of a run tells of.
+MOST_CLAMPS = 4
+
 app = typer.Typer(
     help="Soft helical filaments swimming at low Reynolds number.",
     no_args_is_help=True,
@@ -273,6 +276,7 @@ def _report(done: Run, path: Path) -> str:
         lines.append(f"head rate         {values['head_rate'] / rpm(1.0):.4g} rpm")
     if values["efficiency"] is not None:
         lines.append(f"efficiency        {100 * values['efficiency']:.3g} %")
+    lines += _clamps(trajectory)
     wall = trajectory.wall_seconds
     factor = f", {simulated / wall:.3g} times real time" if wall > 0.0 else ""
     lines.append(f"wall time         {wall:.3g} s for {simulated:g} s simulated{factor}")
@@ -280,6 +284,20 @@ def _report(done: Run, path: Path) -> str:
     lines.append(f"steps             {steps_in_words(steps, given)}")
     lines.append(f"saved             {path} ({len(trajectory)} frames)")
     return "\n".join(lines)
+
+
+def _clamps(trajectory: Trajectory) -> list[str]:
+    """Return a line for each of the first clamps: its mean force and torque over the last half of the run."""
+    lines = []
+    later = slice(len(trajectory) // 2, None)
+    for clamp in range(min(MOST_CLAMPS, len(trajectory.scene.clamps)) if len(trajectory) else 0):
+        try:
+            force, torque, _ = trajectory.reaction(clamp)
+        except FlagrsError:  # a file of before reactions were recorded
+            return []
+        held, turned = (", ".join(f"{x:.3g}" for x in part[later].mean(axis=0)) for part in (force, torque))
+        lines.append(f"clamp {clamp:<12}({held}) N, ({turned}) N m on average")
+    return lines
 
 
 def _certainty(trajectory: Trajectory) -> str:

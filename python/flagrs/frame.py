@@ -16,7 +16,7 @@ from flagrs.scene.values import FloatArray
 
 @dataclass(frozen=True)
 class Field:
-    """Shape (N nodes, E edges, M motors), unit and meaning of one array of a frame."""
+    """Shape (N nodes, E edges, M motors, C clamps), unit and meaning of one array of a frame."""
 
     shape: tuple[str | int, ...]
     unit: str
@@ -34,6 +34,9 @@ FIELDS: dict[str, Field] = {
     "motor_angle": Field(("M",), "rad", "angles of the shafts relative to their housings"),
     "motor_speed": Field(("M",), "rad/s", "angular velocities of the shafts relative to their housings"),
     "motor_torque": Field(("M",), "N m", "torques on the shafts"),
+    "clamp_force": Field(("C", 3), "N", "forces of the clamps on what they hold"),
+    "clamp_torque": Field(("C", 3), "N m", "torques of the clamps about their first nodes"),
+    "clamp_power": Field(("C",), "W", "powers that the clamps spend"),
     "minimum_gap": Field((), "m", "smallest surface-to-surface distance, infinite without pairs"),
     "contacts": Field((), "1", "number of touching pairs of edges"),
     "account": Field((WIDTH,), "1", "energies, balances and extremes so far, as flagrs.budget reads them"),
@@ -41,9 +44,13 @@ FIELDS: dict[str, Field] = {
 }
 
 
+#: Fields that files of before have not; they are read as NaN.
+ADDED = ("clamp_force", "clamp_torque", "clamp_power")
+
+
 def shapes_of(scene: Scene) -> dict[str, tuple[int, ...]]:
     """Return the shape of every field for a scene."""
-    sizes = {"N": scene.node_count, "E": scene.edge_count, "M": len(scene.motors)}
+    sizes = {"N": scene.node_count, "E": scene.edge_count, "M": len(scene.motors), "C": len(scene.clamps)}
     return {
         name: tuple(sizes[size] if isinstance(size, str) else size for size in field.shape)
         for name, field in FIELDS.items()

@@ -42,13 +42,21 @@ def native_vector(signal: VectorSignal, field: str) -> list[Any]:
     return [native_signal(component, field) for component in components(signal)]
 
 
-def native_loads(scene: Scene) -> list[dict[str, Any]]:
-    """Return the loads, each a force or a torque with its place, frame and three signals."""
+def native_loads(scene: Scene, given: Scene) -> list[dict[str, Any]]:
+    """Return the loads, each a force or a torque with its place, frame and three signals.
+
+    Parameters
+    ----------
+    scene
+        The scene of the moment.
+    given
+        The scene that the equations were made from: what acts there is here even if it is zero now.
+    """
     found = []
     for position, load in enumerate(scene.loads):
         place = _point(scene, load, position) if isinstance(load, PointLoad) else _line(scene, load)
         for kind, signal, where in place:
-            if not is_zero(signal):
+            if ("torque" if "torque" in kind else "force") in given.loads[position].acting:
                 material = load.frame == "material"
                 found.append(
                     {

@@ -12,6 +12,7 @@ from flagrs.assemble import edges_of
 from flagrs.flow import flow_of, immersed_edges
 from flagrs.force_density import ForceDensity
 from flagrs.memory import require_memory
+from flagrs.reactions import Reaction, reaction_of
 from flagrs.scene import Scene
 from flagrs.scene.values import FloatArray, IntArray
 
@@ -42,6 +43,18 @@ class ReadOuts:
     def edges(self) -> IntArray:
         """Start and end node (E, 2) of the edges."""
         return edges_of(self._scene)
+
+    def reaction(self, clamp: int = 0) -> Reaction:
+        """Return force (3,), torque (3,) and power of a clamp on its filament in the last step [N, N m, W].
+
+        The torque is about the clamp's first node. Zero before the first step.
+
+        Raises
+        ------
+        SceneError
+            If there is no such clamp.
+        """
+        return reaction_of(clamp, *self._native.reactions())
 
     @property
     def immersed_edges(self) -> IntArray:

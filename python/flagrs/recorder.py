@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from flagrs import trajectory_file
+from flagrs import inputs, trajectory_file
 from flagrs.errors import FileError, FlagrsError
 from flagrs.files import Lock
 from flagrs.frame import checked, shapes_of
@@ -126,13 +126,19 @@ class Recorder:
         self.scene = scene
         self._contents = contents
         self._shapes = shapes_of(scene)
-        self._functions = codec.sampled_functions_of(scene)
         self._waiting: list[tuple[dict[str, FloatArray], dict[str, FloatArray]]] = []
         self._waiting_since = time.perf_counter()
         self._began = self._waiting_since - contents.wall_seconds
         times = contents.frames["time"]
         self._last_time = float(times[-1]) if len(times) else -np.inf
-        self._count = len(times)
+        self._count = self._due_last = len(times)
+
+    def is_due(self, frames: int) -> bool:
+        """Whether a multiple of so many frames has been reached since this was last true."""
+        due = self._count // frames > self._due_last // frames
+        if due:
+            self._due_last = self._count
+        return due
 
     @property
     def frame_count(self) -> int:
@@ -158,7 +164,10 @@ class Recorder:
             raise FlagrsError(
                 f"frame at t = {now:g} s: not later than the one before, at {self._last_time:g} s"
             )
-        samples = {name: codec.sample(function, now) for name, function in self._functions.items()}
+        samples = {
+            name: codec.sample_at(self.scene, name, now, array.shape[1:])
+            for name, array in self._contents.signals.items()
+        }
         self._waiting.append((arrays, samples))
         self._last_time = now
         self._count += 1
@@ -173,7 +182,7 @@ class Recorder:
             return
         frames = {name: np.stack([arrays[name] for arrays, _ in self._waiting]) for name in self._shapes}
         signals = {
-            name: np.array([samples[name] for _, samples in self._waiting]) for name in self._functions
+            name: np.array([samples[name] for _, samples in self._waiting]) for name in self._contents.signals
         }
         self._waiting.clear()
         if self._writer is not None:
@@ -254,8 +263,18 @@ def _scene_to_resume(contents: Contents, given: Scene | None, path: str | Path) 
             driven = ", ".join(contents.signals)
             raise FlagrsError(f"{path}: {driven} was a Python function; give the scene to resume with it")
         return recorded_scene(contents)
-    names = dict.fromkeys(contents.signals)
-    recorded = codec.filled(json.loads(contents.manifest["scene"]), names)
-    if recorded != codec.plain(given, lambda path, function: names.get(path, function)):
+    recorded = codec.from_json(contents.manifest["scene"])
+    found = _without_functions(codec.plain(given, codec.named_function))
+    # The scene of the run's beginning will do, and that of the checkpoint, with the inputs set since.
+    present = inputs.put_into(recorded, inputs.values_in(contents.state.get("inputs", np.zeros(0))))
+    if found not in (_without_functions(recorded), _without_functions(present)):
         raise FlagrsError(f"{path}: recorded from another scene than the one given")
     return given
+
+
+def _without_functions(data: Any) -> Any:
+    """Return a recorded scene with nothing in the place of names of functions, which say little."""
+    if isinstance(data, dict):
+        named = data.keys() == {"function"}
+        return None if named else {name: _without_functions(value) for name, value in data.items()}
+    return [_without_functions(value) for value in data] if isinstance(data, list) else data

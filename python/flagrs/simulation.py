@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable, Mapping
 from datetime import datetime
@@ -12,8 +11,8 @@ from typing import Any, Literal, Never, Self, cast
 import numpy as np
 import numpy.typing as npt
 
-from flagrs import _flagrs
-from flagrs.assemble import native_scene
+from flagrs import _flagrs, inputs
+from flagrs.assemble import native_inputs, native_scene
 from flagrs.budget import statistics_of
 from flagrs.default_step import default_step
 from flagrs.errors import FileError, FlagrsError, not_allowed
@@ -21,11 +20,13 @@ from flagrs.exclusive import Exclusive
 from flagrs.files import same_file
 from flagrs.frame_times import check_frames, frame_times
 from flagrs.guards import Guards, Notice, StabilityWarning, check_contact, check_turn
+from flagrs.live import LiveInputs
 from flagrs.memory import require_memory
 from flagrs.outside_force import ForceFunction, OutsideForce
 from flagrs.progress import bar_for
 from flagrs.read_outs import ReadOuts
 from flagrs.recorder import Recorder, load_checkpoint
+from flagrs.running import Callback, Calling, Every, Run
 from flagrs.scene import Scene
 from flagrs.scene.scene import check_scene
 from flagrs.scene.shapes import number, whole
@@ -43,14 +44,14 @@ from flagrs.trajectory import Trajectory
 #: Where runs are saved when no path is given.
 RUNS_FOLDER = Path("flagrs-runs")
 
+#: What a state holds of inputs that are those of its scene.
+NO_INPUTS = np.zeros(0, np.uint8)
+
 #: More steps than any run makes; larger numbers do not fit the native counter.
 MOST_STEPS = 2**62
 
-#: Frames between checkpoints.
-CHECKPOINT_FRAMES = 20
 
-
-class Simulation(ReadOuts):
+class Simulation(ReadOuts, LiveInputs, Calling):
     """A scene set in motion.
 
     Parameters
@@ -114,7 +115,7 @@ class Simulation(ReadOuts):
         check_scheme(scene, scheme)
         check_contact(scene)
         rtol = chosen_rtol(rtol, dt, scheme)
-        self._scene = scene
+        self._scene = self._given_scene = scene
         native = _flagrs.Simulation(native_scene(scene), scheme, step, thread_count(threads))
         self._exclusive = Exclusive(native, "the simulation")
         self._native = cast(_flagrs.Simulation, self._exclusive)
@@ -186,6 +187,7 @@ class Simulation(ReadOuts):
 
     @dt.setter
     def dt(self, value: float) -> None:
+        self._refuse_in_callback("setting dt")
         self._native.dt = number("dt", value, Bounds("s", above=0.0))
         self._settings.update(dt=self._native.dt, rtol=None)
         self._native.set_tolerance(None)
@@ -200,6 +202,7 @@ class Simulation(ReadOuts):
 
     @rtol.setter
     def rtol(self, value: float | None) -> None:
+        self._refuse_in_callback("setting rtol")
         rtol = chosen_rtol(value, None, self.scheme)
         self._settings["rtol"] = rtol
         self._native.set_tolerance(None if rtol is None else local_tolerance(self._scene, rtol))
@@ -234,6 +237,7 @@ class Simulation(ReadOuts):
         SceneError
             If n is not a whole number, at least 0, or a motor's function gives anything but a finite number.
         """
+        self._refuse_in_callback("step()")
         self._native.step(min(whole("n", n, least=0), MOST_STEPS))
         self._guards.look(self._native.account())
 
@@ -244,6 +248,8 @@ class Simulation(ReadOuts):
         path: str | Path | Literal[False] | None = None,
         progress: Callable[[float], None] | bool | None = None,
         overwrite: bool = False,
+        callback: Callback | None = None,
+        callback_every: Every = "frame",
     ) -> Trajectory:
         """Run until a time and return what was recorded.
 
@@ -264,51 +270,47 @@ class Simulation(ReadOuts):
             Called with the simulated time [s] after every frame; True: a progress bar.
         overwrite
             Whether a file that is there already is replaced.
+        callback
+            Called with the simulation after every frame; it may read whatever it likes and set inputs, such
+            as ``simulation.motors[0].speed``, which count from there on. True stops the run, whose last frame
+            is the present instant; None and False let it go on. What it raises ends the run and tells the
+            time; the simulation stands at its last good state. With it adaptive steps end at every frame.
+        callback_every
+            ``step`` calls it after every step instead.
 
         Raises
         ------
         ConvergenceError
             As `step`; frames up to there are saved.
         SceneError
-            If a time is out of range, or the frames would take more memory than there is.
+            If a time is out of range, the frames would take more memory than there is, or the callback
+            returns anything but True, False or None.
         FileError
             If the file is there already, is written by another run, or cannot be written; an `OSError`.
         """
+        self._refuse_in_callback("run()")
+        if callback_every not in ("frame", "step"):
+            raise not_allowed("callback_every", callback_every, "'frame' or 'step'")
         with self._exclusive.held(), bar_for(progress, until, self._scene.name) as report:
-            return self._run(until, save_every, path, report, overwrite)
-
-    def _run(
-        self,
-        until: float,
-        save_every: float,
-        path: str | Path | Literal[False] | None,
-        progress: Callable[[float], None] | None,
-        overwrite: bool,
-    ) -> Trajectory:
-        end = number("until", until, Bounds("s", above=self.time))
-        every = number("save_every", save_every, Bounds("s", above=0.0))
-        check_frames(self._scene, self.time, end, every)
-        target = self._path(path)
-        again = target is not None and same_file(target, self._restored)
-        if again and target is not None:
-            recorder = Recorder.resume(target, self._scene)
-        else:
-            recorder = self._recorder(target, overwrite)
-        with recorder:
-            if not again:
-                recorder.append(self.frame())
-            start = recorder.last_time if again else self.time
-            for time in frame_times(start, end, every):
-                recorder.append(self._frame_at(time, end))
-                self._guards.look(self._native.account())
-                if recorder.frame_count % CHECKPOINT_FRAMES == 0:
-                    recorder.checkpoint(self.state())
-                    self._check_stability()
-                if progress is not None:
-                    progress(time)
-            recorder.checkpoint(self.state())
-            self._guards.look(self._native.account(), end=True)
-        return recorder.trajectory()
+            end = number("until", until, Bounds("s", above=self.time))
+            every = number("save_every", save_every, Bounds("s", above=0.0))
+            check_frames(self._scene, self.time, end, every)
+            target = self._path(path)
+            again = target is not None and same_file(target, self._restored)
+            if again and target is not None:
+                recorder = Recorder.resume(target, self._given_scene)
+            else:
+                recorder = self._recorder(target, overwrite)
+            with recorder:
+                recorder.scene = self._scene
+                if not again:
+                    recorder.append(self.frame())
+                start = recorder.last_time if again else self.time
+                run = Run(self, recorder, end, callback, callback_every, report)
+                run.go(frame_times(start, end, every))
+                recorder.checkpoint(self.state())
+                self._guards.look(self._native.account(), end=True)
+            return recorder.trajectory()
 
     def _path(self, path: str | Path | Literal[False] | None) -> Path | None:
         if path is False:
@@ -322,25 +324,6 @@ class Simulation(ReadOuts):
 
     def _recorder(self, path: Path | None, overwrite: bool) -> Recorder:
         return Recorder(path, self._scene, self._settings, overwrite=overwrite)
-
-    def _frame_at(self, time: float, end: float) -> dict[str, Any]:
-        """Return the frame at a time, reached by fixed steps or interpolated between adaptive ones."""
-        if self.rtol is None:
-            self._reach(time)
-            return self.frame()
-        self._native.advance_past(time, end)
-        return self._native.frame_at(time)
-
-    def _reach(self, time: float) -> None:
-        """Step to a time exactly, in equal steps no longer than `dt`."""
-        span = time - self.time
-        wanted = self._native.dt
-        count = max(1, math.ceil(span / wanted - 1e-9))
-        self._native.dt = span / count
-        try:
-            self._native.step(count)
-        finally:
-            self._native.dt = wanted
 
     def set_state(self, nodes: Any, theta: Any = None) -> None:
         """Place the nodes and, if given, the edge angles; everything at rest.
@@ -388,7 +371,8 @@ class Simulation(ReadOuts):
 
     def state(self) -> dict[str, npt.NDArray[Any]]:
         """Return everything that changes, to the last bit."""
-        return self._native.state()
+        same = self._scene is self._given_scene
+        return self._native.state() | {"inputs": NO_INPUTS.copy() if same else inputs.recorded(self._scene)}
 
     def load_state(self, state: Mapping[str, npt.NDArray[Any]]) -> None:
         """Take over what `state` returned, of a simulation of the same scene.
@@ -396,15 +380,57 @@ class Simulation(ReadOuts):
         Raises
         ------
         SceneError
-            If it does not belong to this scene, or is not finite.
+            If it does not belong to this scene, or is not finite; nothing is changed.
+        FlagrsError
+            If inputs were Python functions that this simulation does not have.
         """
-        present = self._native.state()
+        self._refuse_in_callback("load_state()")
+        parts, record = self._parts_of(state), self._record_in(state)
+        present, scene = self._native.state(), self._scene
+        self._drive(inputs.resumed(record, scene, self._given_scene))
+        try:
+            self._native.load_state(parts)
+        except BaseException:
+            self._drive(scene)
+            self._native.load_state(present)
+            raise
+
+    def _parts_of(self, state: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+        """Return the arrays of a state as the core takes them; states of before lack some."""
         if not isinstance(state, Mapping):
             raise not_allowed("state", state, "what state() returned")
+        present = self._native.state()
+        still = np.zeros_like(present["clamp_reactions"])
+        state = {"clamp_reactions": still} | dict(state)
         missing = present.keys() - state.keys()
         if missing:
             raise not_allowed("state", f"without {', '.join(sorted(missing))}", "what state() returned")
-        self._native.load_state({name: state_part(name, state[name], like) for name, like in present.items()})
+        return {name: state_part(name, state[name], like) for name, like in present.items()}
+
+    def _record_in(self, state: Mapping[str, npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        """Return the inputs recorded in a state; states of before have none."""
+        return state_part("inputs", state.get("inputs", NO_INPUTS), NO_INPUTS)
+
+    def _change(self, path: str, value: Any) -> None:
+        """Give one of the inputs another value from the next step on."""
+        scene, before = inputs.changed(self._scene, path, value, self._given_scene), self._scene
+        if scene is before:
+            return
+        with self._exclusive.held():
+            moved = inputs.turning_clamp_that_moves(path, scene)
+            center = None if moved is None else self._native.clamp_center(moved)
+            self._drive(scene)
+            if moved is not None and center is not None:
+                # The axis goes on from where the motion before has taken it.
+                there = self._native.clamp_center(moved)
+                shift = np.zeros(3) if there is None else center - there
+                self._drive(inputs.with_center_shifted(scene, moved, shift))
+
+    def _drive(self, scene: Scene) -> None:
+        """Take over the inputs of a scene that differs in nothing else."""
+        if scene is not self._scene:
+            self._native.set_inputs(native_inputs(scene, self._given_scene))
+            self._scene = scene
 
     def checkpoint(self, path: str | Path, overwrite: bool = False) -> None:
         """Write the present state to a file that `restore` reads.
@@ -428,8 +454,9 @@ class Simulation(ReadOuts):
     def __copy__(self) -> Self:
         """Return a simulation of its own at the same state, which goes on to the same bits."""
         with self._exclusive.held():
-            twin = type(self)(self._scene, **(self._settings | {"force": self._force}))
+            twin = type(self)(self._given_scene, **(self._settings | {"force": self._force}))
             twin._native.dt = self.dt
+            twin._drive(self._scene)
             twin.load_state(self.state())
         return twin
 

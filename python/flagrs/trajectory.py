@@ -23,6 +23,7 @@ from flagrs.guards import Notice, StationarityWarning, notices
 from flagrs.lazy_frames import LazyField
 from flagrs.measures import along, angle_about, slope, spin_about, window
 from flagrs.results.bundle import Bundle, bundle_of
+from flagrs.results.drivers import DriverReadOuts
 from flagrs.results.material_frames import directors, each_director
 from flagrs.results.readouts import ReadOuts, readouts_of
 from flagrs.results.swimming import Swimming, swimming_of
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from flagrs.view import View
 
 
-class Trajectory:
+class Trajectory(DriverReadOuts):
     """The frames of a run, in SI units.
 
     With T frames, N nodes, E edges and M motors, in the scene's numbering:
@@ -56,6 +57,9 @@ class Trajectory:
         Force on the fluid per length (T, N, 3) [N/m]; zero where the fluid does not act.
     motor_angle, motor_speed, motor_torque : ndarray
         Angles [rad], speeds [rad/s] and torques [N m] of the shafts (T, M).
+    clamp_force, clamp_torque, clamp_power : ndarray
+        Forces (T, C, 3) [N], torques about their first nodes (T, C, 3) [N m] and powers (T, C) [W] of the C
+        clamps; see `reaction`.
     account : ndarray
         What `energy_budget` and `warnings` read (T, 42).
     energy : ndarray
@@ -83,6 +87,9 @@ class Trajectory:
         self.motor_angle = frames["motor_angle"]
         self.motor_speed = frames["motor_speed"]
         self.motor_torque = frames["motor_torque"]
+        self.clamp_force = frames["clamp_force"]
+        self.clamp_torque = frames["clamp_torque"]
+        self.clamp_power = frames["clamp_power"]
         self.energy = frames["energy"]
         self.account = frames["account"]
         self.scene = scene

@@ -22,8 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 FORMAT = "flagrs trajectory"
-#: Version 1 had no checksums.
-FORMAT_VERSION = 2
+#: Version 1 had no checksums, version 2 no reactions of clamps.
+FORMAT_VERSION = 3
 
 #: The last bytes of a file that was closed: digest of all bytes before, their number, and a mark.
 _MARK = b"flagrs: whole.\r\n"

@@ -11,6 +11,7 @@ and a file that was closed ends in a digest of all its bytes (`trajectory_checks
 from __future__ import annotations
 
 import io
+import json
 import os
 import signal
 import subprocess
@@ -27,7 +28,7 @@ import numpy.typing as npt
 from flagrs import trajectory_checks
 from flagrs.errors import FileError, FileMissingError, FlagrsError, file_error
 from flagrs.files import Lock, check_output, publish, temporary_beside
-from flagrs.frame import FIELDS
+from flagrs.frame import ADDED, FIELDS
 from flagrs.lazy_frames import FrameStore, LazyField
 from flagrs.safe_stream import SafeStream
 from flagrs.scene.values import FloatArray
@@ -172,10 +173,25 @@ def read(path: Path) -> Contents:
         raise
     except (OSError, ValueError) as error:
         raise file_error(path, error, "cannot be read") from None
+    _add_fields(raw)
     if raw["frames"].keys() != FIELDS.keys():
         odd = ", ".join(sorted(raw["frames"].keys() ^ FIELDS.keys()))[:200]
         raise FileError(path, f"damaged: missing or unknown fields: {odd}")
     return Contents(state=state, **raw)
+
+
+def _add_fields(raw: dict[str, Any]) -> None:
+    """Put what was not recorded yet when a file was written into its frames, as NaN."""
+    frames, scene = raw["frames"], raw["manifest"]["scene"]
+    absent = [name for name in ADDED if name not in frames]
+    if absent and "time" in frames:
+        try:
+            clamps = len(json.loads(scene).get("clamps", ()))
+        except (ValueError, AttributeError, TypeError):
+            return
+        for name in absent:
+            width = [clamps if isinstance(size, str) else size for size in FIELDS[name].shape]
+            frames[name] = np.full((len(frames["time"]), *width), np.nan)
 
 
 def read_as(path: Path, lazy: bool | None) -> Contents:
@@ -207,7 +223,7 @@ def read_lazily(path: Path) -> Contents:
         _look_at(path, lazily=True)
         file = trajectory_checks.opened(os.fspath(path))
         raw = trajectory_checks.outline(file, path.stat().st_size)
-        if raw is None:
+        if raw is None or any(name not in raw["frames"] for name in ADDED):
             file.close()
             return read(path)
         if raw["frames"].keys() != FIELDS.keys():

@@ -68,6 +68,15 @@ impl Motion {
         Ok(shift)
     }
 
+    /// A point of the axis at a time; none if the clamp does not turn.
+    ///
+    /// # Errors
+    /// What a user's function fails with.
+    pub fn center(&self, time: f64) -> Result<Option<Vec3>, SignalError> {
+        let Some(turning) = &self.turning else { return Ok(None) };
+        Ok(Some(turning.center + self.shift(0.0, time)?))
+    }
+
     /// Rotation from `t0` to `t1`, and the center at `t0`; none if the clamp does not turn.
     fn turn(&self, t0: f64, t1: f64) -> Result<Option<(Rotation3<f64>, Vec3)>, SignalError> {
         let Some(turning) = &self.turning else { return Ok(None) };

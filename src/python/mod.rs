@@ -2,6 +2,7 @@
 //!
 //! * [`specification`]: a scene's plain data from a mapping of arrays.
 //! * [`simulation`]: the simulation class.
+//! * [`state`], [`frame`]: states and frames as arrays; [`inputs`]: what drives a scene; [`rollout`]: many states side by side.
 //! * [`force`]: a function that is asked for forces.
 //! * [`loads`]: loads, magnetism and background flows from mappings.
 //! * [`body`]: the surface of a rigid body.
@@ -15,10 +16,14 @@ mod body;
 mod errors;
 mod far_field;
 mod force;
+mod frame;
+mod inputs;
 mod loads;
 mod numerics;
+mod rollout;
 mod simulation;
 mod specification;
+mod state;
 mod walls;
 
 use pyo3::prelude::*;

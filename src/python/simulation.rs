@@ -2,24 +2,20 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList};
 
-use super::arrays::{from_flat, from_points, points, values};
+use super::arrays::{from_points, points, values};
 use super::errors::{linear_error, model_error, scene_error, step_error, term_error};
+use super::frame::{Reactions, frame_arrays, frame_error, reaction_arrays};
+use super::inputs::InputsInput;
+use super::rollout::{CaseInput, PlanInput};
 use super::specification::SceneInput;
-use crate::bdf::control::{Control, NO_CEILING};
-use crate::bdf::history::{History, Sample};
-use crate::rod::reference::ReferenceFrames;
+use super::state::{StateInput, state_arrays};
 use crate::simulation as core;
 use crate::simulation::failure::StepError;
-use crate::state::State;
-use crate::state::account::Account;
 use crate::step::scheme::Scheme;
-
-/// The energies that frames hold, in their order.
-const ELASTIC: [&str; 3] = ["stretching", "bending", "twisting"];
 
 /// A running simulation; the class `flagrs.Simulation` wraps it.
 #[pyclass(module = "flagrs._flagrs")]
@@ -83,8 +79,8 @@ impl Simulation {
 
     /// The frame at a time within the last step, interpolated as far as contact allows.
     fn frame_at<'py>(&mut self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyDict>> {
-        let then = self.inner.frame_state(time).map_err(|error| step_error(py, error))?;
-        self.inner.look_at(then, |inner| frame_of(py, inner))
+        let frame = self.inner.frame_at(time).map_err(|error| frame_error(py, error))?;
+        frame_arrays(py, &frame)
     }
 
     /// Advances by `duration` seconds in one step.
@@ -228,7 +224,8 @@ impl Simulation {
 
     /// Everything a saved frame holds, as a mapping of arrays.
     fn frame<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.inner.balanced(|inner| frame_of(py, inner)).map_err(|error| step_error(py, error))?
+        let frame = self.inner.frame().map_err(|error| frame_error(py, error))?;
+        frame_arrays(py, &frame)
     }
 
     /// Energies, balances and extremes so far, as `flagrs.budget` reads them.
@@ -256,85 +253,45 @@ impl Simulation {
 
     /// The whole state as a mapping of arrays, exact to the last bit.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (state, out) = (self.inner.state(), PyDict::new(py));
-        let pairs = state.contacts.iter().flat_map(|(pair, _)| pair.map(i64::from));
-        out.set_item("time", PyArray1::from_slice(py, &[state.time]))?;
-        out.set_item("steps", PyArray1::from_slice(py, &[state.steps]))?;
-        out.set_item("q", PyArray1::from_slice(py, &state.q))?;
-        out.set_item("velocity", PyArray1::from_slice(py, &state.velocity))?;
-        let past = &state.history.past;
-        let rows = |part: fn(&Sample) -> &Vec<f64>, width: usize| {
-            PyArray1::from_vec(py, past.iter().flat_map(part).copied().collect::<Vec<f64>>())
-                .reshape([past.len(), width])
-        };
-        out.set_item("density", PyArray1::from_slice(py, &state.density))?;
-        out.set_item("tensions", PyArray1::from_slice(py, &state.tensions))?;
-        out.set_item("control_step", PyArray1::from_slice(py, &control_numbers(&state.control)))?;
-        out.set_item("control_order", PyArray1::from_slice(py, &[state.control.order as u64]))?;
-        out.set_item("history_times", PyArray1::from_iter(py, past.iter().map(|sample| sample.time)))?;
-        out.set_item("history_states", rows(|sample| &sample.q, state.q.len())?)?;
-        out.set_item("history_velocities", rows(|sample| &sample.velocity, state.q.len())?)?;
-        out.set_item("history_densities", rows(|sample| &sample.density, state.density.len())?)?;
-        out.set_item("history_order", PyArray1::from_slice(py, &[state.history.order as u64]))?;
-        out.set_item("tangents", from_points(py, &state.frames.tangents)?)?;
-        out.set_item("directors", from_points(py, &state.frames.directors)?)?;
-        out.set_item("twists", PyArray1::from_slice(py, &state.frames.twists))?;
-        out.set_item("motor_angles", PyArray1::from_slice(py, &state.motor_angles))?;
-        out.set_item("contact_pairs", PyArray1::from_iter(py, pairs).reshape([state.contacts.len(), 2])?)?;
-        out.set_item("contact_anchor", from_points(py, &state.contact_anchor)?)?;
-        out.set_item("account", PyArray1::from_slice(py, &state.account.numbers()))?;
-        out.set_item("contact_forces", PyArray1::from_iter(py, state.contacts.iter().map(|(_, force)| *force)))?;
-        Ok(out)
+        state_arrays(py, self.inner.state())
     }
 
     /// Takes over a state saved by `state()` of a simulation of the same scene.
     fn load_state(&mut self, py: Python<'_>, saved: StateInput<'_>) -> PyResult<()> {
-        saved.check_shapes(py, self.inner.model().dof_count())?;
-        let account = Account::from_numbers(&values(&saved.account))
-            .ok_or_else(|| scene_error(py, "state", "an account of another length", "what state() returned"))?;
-        let state = State {
-            time: first(&saved.time),
-            steps: saved.steps.as_array().first().copied().unwrap_or(0),
-            q: values(&saved.q),
-            velocity: values(&saved.velocity),
-            density: values(&saved.density),
-            tensions: values(&saved.tensions),
-            control: control(&saved),
-            history: History { past: past(&saved), order: whole(&saved.history_order) },
-            frames: ReferenceFrames {
-                tangents: points(py, "tangents", &saved.tangents)?,
-                directors: points(py, "directors", &saved.directors)?,
-                twists: values(&saved.twists),
-            },
-            motor_angles: values(&saved.motor_angles),
-            contacts: contacts(py, &saved)?,
-            account,
-            contact_anchor: points(py, "contact_anchor", &saved.contact_anchor)?,
-        };
+        let state = saved.state(py, self.inner.model().dof_count())?;
         self.inner.adopt(state).map_err(|error| model_error(py, &error))
     }
-}
 
-/// Everything a saved frame holds of the present state.
-fn frame_of<'py>(py: Python<'py>, inner: &mut core::Simulation) -> PyResult<Bound<'py, PyDict>> {
-    let frame = PyDict::new(py);
-    let speeds = inner.motor_speeds().map_err(|error| step_error(py, StepError::Signal(error)))?;
-    let density = inner.force_density().map_err(|error| linear_error(py, &error))?;
-    frame.set_item("time", inner.state().time)?;
-    frame.set_item("nodes", from_points(py, &inner.positions())?)?;
-    frame.set_item("theta", angles_of(py, inner))?;
-    frame.set_item("velocities", from_points(py, &inner.velocities())?)?;
-    frame.set_item("force_density", from_flat(py, density, 3)?)?;
-    frame.set_item("motor_angle", PyArray1::from_slice(py, &inner.state().motor_angles))?;
-    frame.set_item("motor_speed", PyArray1::from_vec(py, speeds))?;
-    frame.set_item("motor_torque", PyArray1::from_vec(py, inner.motor_torques()))?;
-    frame.set_item("minimum_gap", inner.smallest_gap().unwrap_or(f64::INFINITY))?;
-    frame.set_item("contacts", inner.state().contacts.len())?;
-    frame.set_item("account", PyArray1::from_slice(py, &inner.state().account.numbers()))?;
-    let energies = inner.energies();
-    let elastic = ELASTIC.map(|part| energies.iter().find(|(name, _)| *name == part).map_or(f64::NAN, |(_, e)| *e));
-    frame.set_item("energy", PyArray1::from_slice(py, &elastic))?;
-    Ok(frame)
+    /// Drives the scene by other signals and flows from the next step on; as many of each as there are.
+    fn set_inputs(&mut self, py: Python<'_>, inputs: InputsInput<'_>) -> PyResult<()> {
+        let inputs = inputs.inputs(py, self.inner.model())?;
+        self.inner.set_inputs(inputs);
+        Ok(())
+    }
+
+    /// Where a point of the axis that a clamp turns about is now, m; none if it does not turn.
+    fn clamp_center<'py>(&self, py: Python<'py>, clamp: usize) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let motion = self.inner.inputs().clamps().get(clamp);
+        let center = motion.map_or(Ok(None), |motion| motion.center(self.inner.state().time));
+        let center = center.map_err(|error| step_error(py, StepError::Signal(error)))?;
+        Ok(center.map(|center| PyArray1::from_slice(py, center.as_slice())))
+    }
+
+    /// Forces (C, 3), torques (C, 3) and powers (C,) of the clamps in the last step.
+    fn reactions<'py>(&mut self, py: Python<'py>) -> PyResult<Reactions<'py>> {
+        let reactions = self.inner.balanced(|inner| inner.state().reactions.clone());
+        reaction_arrays(py, &reactions.map_err(|error| step_error(py, error))?)
+    }
+
+    /// Takes many states of this simulation's model forward, side by side; see `flagrs.rollout`.
+    fn rollout<'py>(
+        &self,
+        py: Python<'py>,
+        cases: Vec<CaseInput<'py>>,
+        plan: PlanInput,
+    ) -> PyResult<Bound<'py, PyList>> {
+        super::rollout::rollout(py, &self.inner, cases, &plan)
+    }
 }
 
 /// Angles of the edges, rad.
@@ -365,111 +322,5 @@ fn interruptible(
         (Some(error), _) => Err(error),
         (None, Err(error)) => Err(step_error(py, error)),
         (None, Ok(())) => py.check_signals(),
-    }
-}
-
-/// A saved state.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-struct StateInput<'py> {
-    time: PyReadonlyArray1<'py, f64>,
-    steps: PyReadonlyArray1<'py, u64>,
-    q: PyReadonlyArray1<'py, f64>,
-    velocity: PyReadonlyArray1<'py, f64>,
-    density: PyReadonlyArray1<'py, f64>,
-    tensions: PyReadonlyArray1<'py, f64>,
-    control_step: PyReadonlyArray1<'py, f64>,
-    control_order: PyReadonlyArray1<'py, u64>,
-    history_times: PyReadonlyArray1<'py, f64>,
-    history_states: PyReadonlyArray2<'py, f64>,
-    history_velocities: PyReadonlyArray2<'py, f64>,
-    history_densities: PyReadonlyArray2<'py, f64>,
-    history_order: PyReadonlyArray1<'py, u64>,
-    tangents: PyReadonlyArray2<'py, f64>,
-    directors: PyReadonlyArray2<'py, f64>,
-    twists: PyReadonlyArray1<'py, f64>,
-    motor_angles: PyReadonlyArray1<'py, f64>,
-    contact_pairs: PyReadonlyArray2<'py, i64>,
-    contact_forces: PyReadonlyArray1<'py, f64>,
-    contact_anchor: PyReadonlyArray2<'py, f64>,
-    account: PyReadonlyArray1<'py, f64>,
-}
-
-fn first(array: &PyReadonlyArray1<'_, f64>) -> f64 {
-    array.as_array().first().copied().unwrap_or(f64::NAN)
-}
-
-fn whole(array: &PyReadonlyArray1<'_, u64>) -> usize {
-    array.as_array().first().map_or(0, |&value| value as usize)
-}
-
-/// What [`control`] reads, but for the order.
-fn control_numbers(control: &Control) -> [f64; 3] {
-    [control.dt, control.ceiling, f64::from(u8::from(control.at_jump))]
-}
-
-/// Size and order of the next step; files of before there was a ceiling have none.
-fn control(saved: &StateInput<'_>) -> Control {
-    let number = |k: usize| saved.control_step.as_array().get(k).copied();
-    Control {
-        dt: first(&saved.control_step),
-        order: whole(&saved.control_order),
-        ceiling: number(1).filter(|ceiling| *ceiling > 0.0).map_or(NO_CEILING, |ceiling| ceiling.min(NO_CEILING)),
-        at_jump: number(2).is_some_and(|flag| flag != 0.0),
-    }
-}
-
-fn past(saved: &StateInput<'_>) -> Vec<Sample> {
-    let (states, velocities) = (saved.history_states.as_array(), saved.history_velocities.as_array());
-    let densities = saved.history_densities.as_array();
-    saved
-        .history_times
-        .as_array()
-        .iter()
-        .zip(states.rows())
-        .zip(velocities.rows())
-        .zip(densities.rows())
-        .map(|(((&time, q), velocity), density)| Sample {
-            time,
-            q: q.to_vec(),
-            velocity: velocity.to_vec(),
-            density: density.to_vec(),
-        })
-        .collect()
-}
-
-fn contacts(py: Python<'_>, saved: &StateInput<'_>) -> PyResult<Vec<([u32; 2], f64)>> {
-    let (pairs, forces) = (saved.contact_pairs.as_array(), saved.contact_forces.as_array());
-    let index = |value: i64| {
-        u32::try_from(value)
-            .map_err(|_| scene_error(py, "state.contact_pairs", &value.to_string(), "indices of bodies"))
-    };
-    pairs.rows().into_iter().zip(forces).map(|(pair, &force)| Ok(([index(pair[0])?, index(pair[1])?], force))).collect()
-}
-
-impl StateInput<'_> {
-    /// Checks the shapes that converting takes for granted; the core checks everything else.
-    fn check_shapes(&self, py: Python<'_>, dofs: usize) -> PyResult<()> {
-        let past = self.history_times.as_array().len();
-        let flow = self.density.as_array().len();
-        let forces = self.contact_forces.as_array().len();
-        let wanted = [
-            ("time", self.time.shape(), vec![1]),
-            ("steps", self.steps.shape(), vec![1]),
-            ("control_step", self.control_step.shape(), vec![if self.control_step.len() == 1 { 1 } else { 3 }]),
-            ("control_order", self.control_order.shape(), vec![1]),
-            ("history_order", self.history_order.shape(), vec![1]),
-            ("history_states", self.history_states.shape(), vec![past, dofs]),
-            ("history_velocities", self.history_velocities.shape(), vec![past, dofs]),
-            ("history_densities", self.history_densities.shape(), vec![past, flow]),
-            ("contact_pairs", self.contact_pairs.shape(), vec![forces, 2]),
-        ];
-        match wanted.iter().find(|(_, shape, wanted)| shape != wanted) {
-            Some((name, shape, wanted)) => {
-                let (found, allowed) = (format!("shape {shape:?}"), format!("of shape {wanted:?}"));
-                Err(scene_error(py, &format!("state.{name}"), &found, &allowed))
-            }
-            None => Ok(()),
-        }
     }
 }

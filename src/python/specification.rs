@@ -64,9 +64,10 @@ fn called(py: Python<'_>, function: &Py<PyAny>, time: f64, field: &str) -> Resul
     }
 }
 
+/// A motor, by its hinge.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct MotorInput<'py> {
+pub(super) struct MotorInput<'py> {
     hinge: usize,
     shaft_second: bool,
     by_torque: bool,
@@ -92,9 +93,10 @@ struct TurningInput<'py> {
     angle: SignalInput<'py>,
 }
 
+/// A clamp, by what it holds and how it moves.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct ClampInput<'py> {
+pub(super) struct ClampInput<'py> {
     nodes: Vec<usize>,
     edges: Vec<usize>,
     axes: [bool; 3],
@@ -131,6 +133,30 @@ struct ContactInput {
     spheres: Vec<(usize, f64)>,
     exclusion: f64,
     colliding: Vec<bool>,
+}
+
+impl MotorInput<'_> {
+    /// What drives it.
+    pub fn signal(self) -> Signal {
+        self.signal.signal()
+    }
+}
+
+impl ClampInput<'_> {
+    /// How it moves.
+    pub fn motion(self) -> Motion {
+        Motion {
+            velocity: self.velocity.map(SignalInput::signal),
+            displacement: self.displacement.map(SignalInput::signal),
+            turning: self.turning.map(|turning| Turning {
+                axis: Vec3::from(turning.axis),
+                center: Vec3::from(turning.center),
+                rate: turning.rate.signal(),
+                angle: turning.angle.signal(),
+            }),
+            spin: self.angular_velocity.signal(),
+        }
+    }
 }
 
 /// The mapping that describes a scene.
@@ -189,7 +215,7 @@ impl SceneInput<'_> {
                     hinge: motor.hinge,
                     shaft_second: motor.shaft_second,
                     by_torque: motor.by_torque,
-                    signal: motor.signal.signal(),
+                    signal: motor.signal(),
                 })
                 .collect(),
             head: self.head.map(|head| HeadSpecification {
@@ -203,20 +229,10 @@ impl SceneInput<'_> {
                 .clamps
                 .into_iter()
                 .map(|clamp| ClampSpecification {
-                    nodes: clamp.nodes,
-                    edges: clamp.edges,
+                    nodes: clamp.nodes.clone(),
+                    edges: clamp.edges.clone(),
                     axes: clamp.axes,
-                    motion: Motion {
-                        velocity: clamp.velocity.map(SignalInput::signal),
-                        displacement: clamp.displacement.map(SignalInput::signal),
-                        turning: clamp.turning.map(|turning| Turning {
-                            axis: Vec3::from(turning.axis),
-                            center: Vec3::from(turning.center),
-                            rate: turning.rate.signal(),
-                            angle: turning.angle.signal(),
-                        }),
-                        spin: clamp.angular_velocity.signal(),
-                    },
+                    motion: clamp.motion(),
                 })
                 .collect(),
             loads: self.loads.into_iter().map(LoadInput::specification).collect::<PyResult<_>>()?,

@@ -201,6 +201,7 @@ impl Simulation {
             order,
             shortest_lasting: INSTANT * self.dt,
         })?;
+        let reactions = self.solver.reactions(&self.model, &self.trial.q, &velocity);
         let angles = step.drives.motor_angles;
         if !account.is_finite() {
             return Err(TryError::Solve {
@@ -212,6 +213,7 @@ impl Simulation {
         }
         let state = &mut self.state;
         state.account = account;
+        state.reactions = reactions;
         let replaced = Sample {
             time: state.time,
             q: std::mem::replace(&mut state.q, self.trial.q.clone()),

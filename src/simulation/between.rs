@@ -127,6 +127,11 @@ impl Simulation {
         if self.correct(&step, &mut found, goal).is_some() {
             let rates = state.velocity.iter_mut().zip(found.q.iter().zip(&base.q));
             rates.for_each(|(velocity, (new, old))| *velocity += step.rate * (new - old));
+            if !self.model.clamps.is_empty()
+                && self.solver.evaluate(Problem::new(&self.model, &step), &found, &mut Statistics::default()).is_some()
+            {
+                state.reactions = self.solver.reactions(&self.model, &found.q, &state.velocity);
+            }
             (state.q, state.density, state.tensions) = (found.q, found.density, found.tensions);
             self.solver.at.configuration.accept(&mut state.frames);
         }

@@ -1,7 +1,7 @@
 //! A simulation: steps a model's state, retries with smaller steps, and keeps the last good state.
 //!
 //! * `attempt`: one try at a step, and its acceptance; `adaptive`: steps of adaptive size and order; `between`, `output`: states between them.
-//! * `diagnostics`: motor torques, force densities, gaps.
+//! * [`frame`]: what is told of an instant; `diagnostics`: motor torques, force densities, gaps.
 //! * `outside`: forces that a caller's function gives; `progress`: whether work still moves the time on.
 //! * [`failure`]: what can go wrong with a step.
 
@@ -10,6 +10,7 @@ mod attempt;
 mod between;
 mod diagnostics;
 pub mod failure;
+pub mod frame;
 mod output;
 mod outside;
 pub(crate) mod progress;
@@ -123,7 +124,12 @@ impl Simulation {
     /// Drives the scene by other inputs from here on; rates may jump, so that past states foretell nothing any more.
     pub fn set_inputs(&mut self, inputs: Inputs) {
         self.inputs = inputs;
-        self.begin_anew();
+        self.state.control.at_jump = true;
+    }
+
+    /// Local error of adaptive steps; none for fixed steps.
+    pub fn tolerance(&self) -> Option<f64> {
+        self.tolerance
     }
 
     /// The constant part, to be shared.

@@ -36,7 +36,9 @@ impl State {
         range("state.control_step", ceiling, ceiling > 0.0, "> 0 s")?;
         self.check_history(dofs, flow)?;
         self.check_frames(edges)?;
-        self.check_contacts(model)
+        self.check_contacts(model)?;
+        length("state.clamp_reactions", self.reactions.len(), model.clamps.len())?;
+        self.reactions.iter().try_for_each(|reaction| finite("state.clamp_reactions", &reaction.numbers()))
     }
 
     fn check_history(&self, dofs: usize, flow: usize) -> Result<(), ModelError> {

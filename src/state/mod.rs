@@ -1,12 +1,15 @@
 //! The changing part of a simulation: plain data, copied and restored to the last bit.
 //!
 //! * [`account`]: energies, balances and extremes so far.
+//! * [`reaction`]: what clamps exert.
 //! * `check`: what must hold of a state from elsewhere.
 
 pub mod account;
 mod check;
+pub mod reaction;
 
 use account::Account;
+use reaction::Reaction;
 
 use crate::Vec3;
 use crate::bdf::control::Control;
@@ -45,6 +48,8 @@ pub struct State {
     pub account: Account,
     /// Positions of the nodes, m, where barrier contact has listed its near pairs; empty without.
     pub contact_anchor: Vec<Vec3>,
+    /// What every clamp exerted in the last step.
+    pub reactions: Vec<Reaction>,
 }
 
 impl State {
@@ -68,6 +73,7 @@ impl State {
             contacts: Vec::new(),
             account: Account::default(),
             contact_anchor: Vec::new(),
+            reactions: vec![Reaction::default(); model.clamps.len()],
         };
         let mut configuration = Configuration::new(network, model.dof_count());
         let shafts = model.shafts(&state.motor_angles, &state.q);

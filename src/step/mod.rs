@@ -6,6 +6,7 @@
 //! * `flow`: the fluid in them; `contact`: contact in them, by one of two methods.
 //! * `saddle`: the linear systems of forces and flow; `system`: the sparse matrix in them; `targets`: what a residual is measured by.
 //! * `solver`: all of these together; `equations`: the same as Newton's method sees it.
+//! * `reactions`: what clamps exert.
 //! * `ledger`: what a step adds to energies, balances and extremes.
 //! * [`statistics`]: counts and times.
 
@@ -16,6 +17,7 @@ pub(crate) mod flow;
 pub mod given;
 pub(crate) mod ledger;
 pub(crate) mod problem;
+pub(crate) mod reactions;
 pub(crate) mod saddle;
 pub mod scheme;
 pub(crate) mod solver;

@@ -6,12 +6,31 @@ times. What is drawn is meant to be valid, but need not be: a scene may be refus
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from flagrs import Clamp, Contact, Fluid, Head, Material, Motor, PointLoad, Rod, Scene, Table, Wall
+from flagrs import (
+    Clamp,
+    Contact,
+    Fluid,
+    Head,
+    LinearFlow,
+    LineLoad,
+    MagneticField,
+    Material,
+    Motor,
+    PointLoad,
+    PoiseuilleFlow,
+    Rod,
+    Rotation,
+    Scene,
+    Table,
+    Wall,
+    inputs,
+)
 from hypothesis import strategies as st
 
 Array = npt.NDArray[np.float64]
@@ -229,6 +248,48 @@ def floors(draw: Draw, edge: float, some: list[Rod]) -> Wall:
     wall = Wall(normal=normal, kind=draw(st.sampled_from(["no_slip", "free_surface", "contact"])))
     lowest = min(float(wall.heights(rod.nodes).min()) for rod in some)
     return wall.replace(point=wall.normal * (lowest - edge * draw(decades(-0.5, 1.0))))
+
+
+@st.composite
+def driven_scenes(draw: Draw) -> Scene:
+    """Return scenes with more of what drives from outside: loads, magnets, flows, clamps that turn."""
+    scene: Scene = draw(scenes(fluid=True, free=True))
+    rod = scene.rods[0]
+    edge = float(rod.rest_lengths().mean())
+    fluid = scene.fluid
+    assert fluid is not None
+    force = rod.material.youngs_modulus * float(np.max(rod.radius)) ** 4 / edge**2
+    rate = force / (fluid.viscosity * edge**2)
+    frame = draw(st.sampled_from(["laboratory", "material"]))
+    flow = draw(
+        st.sampled_from([LinearFlow.shear(rate=rate), PoiseuilleFlow(speed=rate * edge, radius=3.0 * edge)])
+    )
+    turning = Rotation(axis=draw(vectors(1.0).filter(lambda axis: axis.any())), rate=draw(signals(rate)))
+    loads: list[Any] = [LineLoad(force=draw(vectors(force / edge)), frame=frame)]
+    if len(rod.nodes) == len(rod.edge_array()) + 1 and rod.edges is None:
+        loads.append(PointLoad(edge=0, torque=draw(vectors(force * edge)), frame=frame))
+    moment = math.pi * float(np.max(rod.radius)) ** 2 * edge
+    return scene.replace(
+        rods=(rod.replace(magnetization=np.array([0.0, 0.0, force * edge / moment])), *scene.rods[1:]),
+        fluid=fluid.replace(background=(flow,)),
+        loads=loads,
+        clamps=(Clamp(rod=0, nodes=(0, 1), edges=(0,), rotation=turning),) if draw(st.booleans()) else (),
+        magnetic_field=MagneticField(field=draw(vectors(1.0))),
+        head=None,
+        motors=(),
+    )
+
+
+@st.composite
+def changes(draw: Draw, scene: Scene) -> dict[str, Any]:
+    """Return other values for some of what may be set between steps, by path."""
+    found: dict[str, Any] = {}
+    for place, part in inputs.parts_of(scene).items():
+        for name in inputs.CHANGEABLE[type(part)]:
+            value = getattr(part, name)
+            if draw(st.booleans()) and isinstance(value, float | np.ndarray):
+                found[f"{place}.{name}"] = -0.5 * value
+    return found
 
 
 @st.composite

@@ -24,7 +24,7 @@ from flagrs.scene.codec import plain
 from flagrs.scene.toml import from_mapping
 from hypothesis import HealthCheck, assume, given, note, settings
 from hypothesis import strategies as st
-from scene_strategies import scenes
+from scene_strategies import changes, driven_scenes, scenes
 from scene_strategies import settings as run_settings
 
 EXAMPLES = int(os.environ.get("FLAGRS_FUZZ_EXAMPLES", "500"))
@@ -218,3 +218,30 @@ def test_a_tenth_of_rtol_changes_the_motion_by_no_more_than_rtol_allows(
         sizes = np.concatenate([np.full(len(rod.nodes), rod.rest_lengths().sum()) for rod in scene.rods])
         # Of the order of rtol of a filament's size; that is never more than its length.
         assert (np.linalg.norm(found[0] - found[1], axis=1) <= 10.0 * rtol * sizes).all()
+
+
+@fuzz(0.06)
+@given(st.data())
+def test_inputs_set_between_steps_are_followed_and_restored_to_the_last_bit(data: st.DataObject) -> None:
+    try:
+        scene = data.draw(driven_scenes())
+    except FlagrsError:
+        assume(False)
+    options = {"rtol": data.draw(st.sampled_from([None, 1e-3]))}
+    with bounded(scene, options):
+        try:
+            simulation = Simulation(scene, threads=1, **options)
+            simulation.step(2)
+            for path, value in data.draw(changes(scene)).items():
+                simulation._change(path, value)
+            state, driven = simulation.state(), simulation.scene
+            again = Simulation(scene, threads=1, **options)
+            again.load_state(state)
+            assert again.scene == driven
+            simulation.step(2)
+        except FlagrsError:
+            return
+        again.step(2)
+        for name, value in simulation.state().items():
+            assert np.array_equal(value, again.state()[name]), name
+        assert np.isfinite(simulation.nodes).all()

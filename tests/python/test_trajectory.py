@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from fake_simulation import MOTOR_SPEED, RATE, SPEED, TORQUE, FakeSimulation, rigid_frame
-from flagrs import FlagrsError, Fluid, Head, Motor, Scene, Table, scenarios
+from flagrs import Clamp, FlagrsError, Fluid, Head, Motor, Scene, Table, scenarios
 from flagrs.frame import FIELDS
 from flagrs.recorder import Recorder, load_checkpoint
 from flagrs.trajectory import Trajectory
@@ -130,10 +130,10 @@ def test_no_efficiency_without_power() -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("name", [name for name in FIELDS if name not in ("time", "minimum_gap")])
 def test_a_frame_that_is_not_finite_is_never_recorded(tmp_path: Path, name: str, bad: float) -> None:
-    path = tmp_path / "run.h5"
-    with Recorder(path, ROBOT, {}) as recorder:
-        recorder.append(rigid_frame(ROBOT, 0.0))
-        frame = rigid_frame(ROBOT, 1.0)
+    path, held = tmp_path / "run.h5", ROBOT.replace(clamps=(Clamp(nodes=(0,)),))
+    with Recorder(path, held, {}) as recorder:
+        recorder.append(rigid_frame(held, 0.0))
+        frame = rigid_frame(held, 1.0)
         values = np.array(frame[name], dtype=float)
         values.flat[-1] = bad
         with pytest.raises(FlagrsError, match=name):

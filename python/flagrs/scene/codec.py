@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +15,7 @@ from flagrs.scene.flow import CheckedFlow
 from flagrs.scene.part import Part
 from flagrs.scene.signal import signal_value
 from flagrs.scene.values import FloatArray
-from flagrs.scene.vector_signal import VectorFunction
+from flagrs.scene.vector_signal import VectorFunction, vector_at
 
 
 def refuse(path: str, function: Callable[[float], float]) -> Any:
@@ -83,10 +84,18 @@ def sampled_functions_of(scene: Part) -> dict[str, Callable[[float], Any]]:
     return {path: value for path, value in functions_of(scene).items() if not isinstance(value, CheckedFlow)}
 
 
-def sample(function: Callable[[float], Any], time: float) -> FloatArray:
-    """Return what a function of time gives at an instant, a number or a vector."""
-    vector = isinstance(function, VectorFunction)
-    return np.asarray(function(time) if vector else signal_value(function, time), dtype=np.float64)
+def sample_at(scene: Part, path: str, time: float, shape: tuple[int, ...]) -> FloatArray:
+    """Return the value of the signal at a path of a scene at an instant, a number or a vector (3,)."""
+    value: Any = scene
+    for name, index in re.findall(r"(\w+)|\[(\d+)\]", path):
+        if name:
+            value = getattr(value, name)
+        elif isinstance(value, tuple):
+            value = value[int(index)]
+        else:
+            # One of three signals was a function, and all of them are something else now.
+            return np.asarray(vector_at(value, time)[int(index)])
+    return vector_at(value, time) if shape else np.asarray(signal_value(value, time))
 
 
 def empty_samples(function: Callable[[float], Any]) -> FloatArray:

@@ -61,6 +61,11 @@ class PointLoad(Part):
     frame: Frame = "laboratory"
     rod: Index = 0
 
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Which of force and torque are in the equations: those given, or the one that it can be."""
+        return _given(self) or (("torque",) if self.node is None else ("force",))
+
     @model_validator(mode="after")
     def _check(self) -> PointLoad:
         if self.node is None and not is_zero(self.force):
@@ -105,6 +110,11 @@ class LineLoad(Part):
     frame: Frame = "laboratory"
     rod: Index = 0
 
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Which of force and torque are in the equations: those given, or else the force."""
+        return _given(self) or ("force",)
+
     @model_validator(mode="after")
     def _check(self) -> LineLoad:
         if self.edges == ():
@@ -118,6 +128,10 @@ class LineLoad(Part):
 
 
 Load = PointLoad | LineLoad
+
+
+def _given(load: Load) -> tuple[str, ...]:
+    return tuple(name for name in ("force", "torque") if not is_zero(getattr(load, name)))
 
 
 def load_of(value: Any) -> Any:
