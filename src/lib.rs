@@ -16,15 +16,18 @@
 //! # The map
 //!
 //! * Know nothing of rods: [`linear`], matrices; [`nonlinear`], Newton's method; [`bdf`], backward differences; [`signal`], functions of
-//!   time; [`runtime`], threads and Ctrl-C.
+//!   time; [`plane`], a half-space; [`runtime`], threads and Ctrl-C.
 //! * What acts on a filament: [`rod`], networks, frames, strains; [`kinematics`], clamps; [`elastic`], energies; [`forces`], motors, loads and
 //!   fields; [`fluid`], drag models and the head; [`contact`], distances and contact forces;
 //!   [`body`], rigid bodies in the flow.
 //! * What moves it: [`model`], the constant part of a scene; [`state`], the changing one; [`inputs`], what drives; [`step`], the equations of
 //!   one step; [`simulation`], step after step.
-//! * Imports run one way: `linear, nonlinear, bdf, signal, runtime <- rod, kinematics <- elastic, forces, fluid, contact, body <- model <- state,
+//! * Imports run one way: `linear, nonlinear, bdf, signal, plane, runtime <- rod, kinematics <- elastic, forces, fluid, contact, body <- model <- state,
 //!   inputs <- step <- simulation <- rollout <- python`.
 //! * [`simulation::Simulation`] is the way in; [`rollout`] takes many states of one model side by side.
+
+#[cfg(test)]
+extern crate self as flagrs;
 
 pub mod bdf;
 pub mod body;
@@ -37,6 +40,7 @@ pub mod kinematics;
 pub mod linear;
 pub mod model;
 pub mod nonlinear;
+pub mod plane;
 #[cfg(feature = "python")]
 mod python;
 pub mod rod;

@@ -6,6 +6,8 @@ mod scenes;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use flagrs::inputs::Inputs;
+use flagrs::signal::Signal;
 use flagrs::simulation::Simulation;
 use flagrs::simulation::failure::StepError;
 use flagrs::state::State;
@@ -81,4 +83,38 @@ fn a_run_interrupted_anywhere_goes_on_to_the_last_bit_as_if_it_had_not_been() {
         }
         assert_eq!(broken.state(), whole.state());
     }
+}
+
+#[test]
+fn simulations_of_a_shared_model_make_the_same_steps_and_know_nothing_of_each_other() {
+    let mut alone = robot();
+    let (model, start) = (alone.shared_model(), alone.state().clone());
+    let mut shared: Vec<Simulation> = (0..2)
+        .map(|_| {
+            let inputs = Inputs::of(&model);
+            Simulation::from_model(Arc::clone(&model), inputs, start.clone(), Scheme::Overdamped, alone.dt(), 1)
+                .expect("the model is valid")
+        })
+        .collect();
+    for _ in 0..3 {
+        alone.step().expect("an ordinary step");
+        shared.iter_mut().for_each(|simulation| simulation.step().expect("an ordinary step"));
+    }
+    assert!(shared.iter().all(|simulation| simulation.state() == alone.state()));
+    // Other inputs move one of them only.
+    let inputs = shared[0].inputs();
+    let still = vec![Signal::Constant(0.0); inputs.motors().len()];
+    let (clamps, loads, flows) = (inputs.clamps().to_vec(), inputs.loads().to_vec(), inputs.flows().to_vec());
+    let other = Inputs::with(&model, still, clamps.clone(), loads.clone(), flows.clone()).expect("as many of each");
+    shared[0].set_inputs(other);
+    shared.iter_mut().for_each(|simulation| simulation.step().expect("an ordinary step"));
+    alone.step().expect("an ordinary step");
+    assert_eq!(shared[1].state(), alone.state());
+    // Three steps of turning, and one of standing still.
+    let quarter = |angle: &f64| 0.75 * angle;
+    let expected: Vec<f64> = alone.state().motor_angles.iter().map(quarter).collect();
+    let stopped = &shared[0].state().motor_angles;
+    assert!(expected.iter().zip(stopped).all(|(a, b)| *b != 0.0 && (a / b - 1.0).abs() < 1e-12), "{stopped:?}");
+    let refusal = Inputs::with(&model, vec![], clamps, loads, flows).err().expect("too few motors").to_string();
+    assert!(refusal.contains("motors: length 0"), "{refusal}");
 }

@@ -2,8 +2,8 @@
 
 use flagrs::fluid::kernel::Boundary;
 use flagrs::fluid::kernel::network::Segments;
-use flagrs::fluid::kernel::plane::Plane;
 use flagrs::fluid::stokeslet::{mobility, velocity};
+use flagrs::plane::Plane;
 use flagrs::{Mat3, Vec3};
 
 fn tilted() -> Plane {

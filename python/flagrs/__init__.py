@@ -45,6 +45,7 @@ if TYPE_CHECKING:
         Sphere,
         Table,
         TimeFunction,
+        Wall,
     )
     from flagrs.simulation import Simulation
     from flagrs.suggestion import Suggestion, suggest
@@ -106,6 +107,7 @@ _PLACES = {
         "Sphere",
         "Table",
         "TimeFunction",
+        "Wall",
     ),
     "flagrs.simulation": ("Simulation",),
     "flagrs.suggestion": (
@@ -157,6 +159,7 @@ __all__ = [
     "Table",
     "TimeFunction",
     "Trajectory",
+    "Wall",
     "__version__",
     "contact",
     "fluid",

@@ -13,6 +13,7 @@ __all__ = [
     "Simulation",
     "__version__",
     "hat_weights",
+    "image_velocity",
     "mobility",
     "segment_distance",
     "thread_count",
@@ -105,7 +106,21 @@ class Simulation:
         self, cases: list[dict[str, Any]], plan: Mapping[str, Any]
     ) -> list[tuple[list[dict[str, Any]] | None, dict[str, npt.NDArray[Any]] | None, Exception | None]]: ...
 
-def mobility(nodes: _Floats, edges: _Ints, epsilon: _Floats, targets: _Floats, threads: int) -> _Floats: ...
+def mobility(
+    nodes: _Floats,
+    edges: _Ints,
+    epsilon: _Floats,
+    targets: _Floats,
+    wall: Mapping[str, Any] | None,
+    threads: int,
+) -> _Floats: ...
+def image_velocity(
+    at: _Floats,
+    segments: tuple[_Floats, _Ints, _Floats],
+    density: _Floats,
+    wall: Mapping[str, Any],
+    threads: int,
+) -> _Floats: ...
 def velocity(
     at: _Floats,
     nodes: _Floats,

@@ -49,6 +49,7 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "natural_curvature": np.concatenate([_natural_curvature(rod) for rod in rods]),
         "natural_twist": np.concatenate([_natural_twist(rod) for rod in rods]),
         "head": None if scene.head is None else _head(scene, scene.head),
+        "walls": [wall.native() for wall in scene.walls],
         "gravity": scene.gravity.tolist(),
         "reynolds": reynolds_per_speed(scene),
         "fluid": None if scene.fluid is None else _fluid(scene, scene.fluid),
@@ -245,18 +246,19 @@ def _contact(scene: Scene, contact: Contact) -> dict[str, Any]:
             raise not_allowed("contact.head_radius", contact.head_radius, "None in a scene without a head")
         spheres = [(scene.node_offset(scene.head.rod) + scene.head.node, contact.head_radius)]
     scales = contact_scales(scene)
-    # One entry per body: edges in the scene's order, then spheres.
+    # One entry per body: edges in the scene's order, then spheres, then walls, which nothing drives or bends.
     owner = np.repeat(np.arange(len(scene.rods)), [len(rod.edge_array()) for rod in scene.rods])
     if spheres and scene.head is not None:
         owner = np.append(owner, scene.head.rod)
-    slip = scales.velocity[owner] * SLIP_SHARE
+    at_rest = np.zeros(len(scene.walls))
+    slip = np.append(scales.velocity[owner] * SLIP_SHARE, at_rest)
     return {
         "barrier": contact.method == "barrier",
         "tolerance": contact.tolerance_or_default(),
         "max_iterations": contact.max_iterations,
         "stiffness": contact.stiffness,
-        "driven": scales.driven[owner].tolist(),
-        "bent": scales.bent[owner].tolist(),
+        "driven": [*scales.driven[owner].tolist(), *at_rest],
+        "bent": [*scales.bent[owner].tolist(), *(at_rest + math.inf)],
         "friction": contact.friction,
         "slip_velocities": (
             slip if contact.slip_velocity is None else np.full_like(slip, contact.slip_velocity)

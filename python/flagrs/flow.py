@@ -9,7 +9,8 @@ import numpy as np
 from flagrs.errors import FlagrsError
 from flagrs.fluid import velocity
 from flagrs.scene import Scene
-from flagrs.scene.values import FloatArray, IntArray
+from flagrs.scene.values import BoolArray, FloatArray, IntArray
+from flagrs.scene.wall_checks import wall_in_flow
 
 
 def immersed_edges(scene: Scene) -> tuple[IntArray, FloatArray]:
@@ -23,6 +24,14 @@ def immersed_edges(scene: Scene) -> tuple[IntArray, FloatArray]:
     return np.concatenate(edges), np.concatenate(widths)
 
 
+def in_fluid(scene: Scene, points: FloatArray) -> BoolArray:
+    """Return which of the points (M, 3) [m] are on the fluid's side of a wall in the flow."""
+    wall = wall_in_flow(scene)
+    heights = np.zeros(len(points)) if wall is None else wall.heights(points)
+    inside: BoolArray = heights >= 0.0
+    return inside
+
+
 def flow_of(
     scene: Scene, nodes: FloatArray, density: FloatArray, points: Any, threads: int | None
 ) -> FloatArray:
@@ -32,4 +41,5 @@ def flow_of(
         raise FlagrsError("a flow needs a fluid of regularized Stokeslet segments, Fluid(model='RSS')")
     # A dry edge beside an immersed one would carry half a hat of their common node's density.
     edges, widths = immersed_edges(scene)
-    return velocity(points, nodes, edges, density, fluid.viscosity, widths, threads)
+    wall = wall_in_flow(scene)
+    return velocity(points, nodes, edges, density, fluid.viscosity, widths, threads, wall)

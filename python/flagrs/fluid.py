@@ -14,13 +14,19 @@ from flagrs.force_density import check_edges
 from flagrs.memory import require_memory
 from flagrs.scene.shapes import number
 from flagrs.scene.values import Bounds, FloatArray, IntArray, index_pairs
+from flagrs.scene.wall import Wall
 from flagrs.threads import thread_count
 
 __all__ = ["BodySurface", "FastMobility", "hat_weights", "mobility", "velocity"]
 
 
 def mobility(
-    nodes: Any, edges: Any, epsilon: Any, targets: Any = None, threads: int | None = None
+    nodes: Any,
+    edges: Any,
+    epsilon: Any,
+    targets: Any = None,
+    threads: int | None = None,
+    wall: Wall | None = None,
 ) -> FloatArray:
     """Return the matrix A with ``8 pi mu u = A f`` for nodal force densities f.
 
@@ -36,6 +42,9 @@ def mobility(
         Points (M, 3) at which the velocity is taken [m]; None: the nodes.
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all.
+    wall
+        A wall or free surface; nodes, and targets or points, are on the side of its normal. None: unbounded
+        fluid.
 
     Returns
     -------
@@ -46,12 +55,13 @@ def mobility(
     Raises
     ------
     SceneError
-        For arrays of the wrong shape, indices out of range, or a regularization that is not positive.
+        For arrays of the wrong shape, indices out of range, a regularization that is not positive, or points
+        behind the wall.
 
     Notes
     -----
     Cortez (2018), doi:10.1016/j.jcp.2018.08.055; docs/theory/fluid.md, equations 12 to 14. Each 3x3 block
-    is exact to 1e-12.
+    is exact to 1e-12, with the images behind a wall as well (docs/theory/walls.md).
 
     Examples
     --------
@@ -68,7 +78,8 @@ def mobility(
         72.0 * rows * len(points),
         "FastMobility makes its products without it",
     )
-    return _flagrs.mobility(points, pairs, widths, at, thread_count(threads))
+    side = _side(wall, {"nodes": points, "targets": points if at is None else at})
+    return _flagrs.mobility(points, pairs, widths, at, side, thread_count(threads))
 
 
 def velocity(
@@ -79,6 +90,7 @@ def velocity(
     viscosity: float,
     epsilon: Any,
     threads: int | None = None,
+    wall: Wall | None = None,
 ) -> FloatArray:
     """Return the velocity of the fluid at points.
 
@@ -94,6 +106,9 @@ def velocity(
         Dynamic viscosity [Pa s].
     threads
         Threads to use; None: ``FLAGRS_THREADS``, else all.
+    wall
+        A wall or free surface; nodes, and targets or points, are on the side of its normal. None: unbounded
+        fluid.
 
     Returns
     -------
@@ -120,7 +135,12 @@ def velocity(
     mu = number("viscosity", viscosity, Bounds("Pa s", above=0.0))
     at = _vectors("points", points)
     scaled = density * (1.0 / (8.0 * math.pi * mu))
-    return _flagrs.velocity(at, sources, pairs, scaled, widths, thread_count(threads))
+    side = _side(wall, {"nodes": sources, "points": at})
+    flow = _flagrs.velocity(at, sources, pairs, scaled, widths, thread_count(threads))
+    if side is None:
+        return flow
+    segments = (sources, pairs, widths)
+    return flow + _flagrs.image_velocity(at, segments, scaled, side, thread_count(threads))
 
 
 class FastMobility:
@@ -204,6 +224,21 @@ def hat_weights(nodes: Any, edges: Any, force_density: Any) -> FloatArray:
         raise _wrong("force_density", f"shape {density.shape}", f"of shape {points.shape}")
     check_edges(force_density, pairs)
     return _flagrs.hat_weights(points, pairs, density)
+
+
+def _side(wall: Wall | None, positions: dict[str, FloatArray]) -> dict[str, Any] | None:
+    """Return a wall for the native module, after checking that everything is on its side."""
+    if wall is None or not wall.in_flow:
+        return None
+    for field, points in positions.items():
+        heights = wall.heights(points)
+        # Points on the wall itself are fluid still, wherever round-off puts them.
+        least = -1e-12 * float(np.abs(points - wall.point).max(initial=0.0))
+        behind = np.flatnonzero(~(heights >= (least if field != "nodes" else 0.0)))
+        if len(behind):
+            value = f"{heights[behind[0]]:g} m from the wall"
+            raise _wrong(f"{field}[{behind[0]}]", value, "on the side of its normal")
+    return wall.native()
 
 
 def _wrong(field: str, value: Any, allowed: str) -> SceneError:

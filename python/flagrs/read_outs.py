@@ -147,7 +147,8 @@ class ReadOuts:
         Returns
         -------
         pairs : ndarray
-            Edges (K, 2) in the scene's global numbering; the head as a sphere comes after the last edge.
+            Edges (K, 2) in the scene's global numbering; the head as a sphere comes after the
+            last edge, and walls after that.
         forces : ndarray
             Normal force (K,) of each pair [N].
         """

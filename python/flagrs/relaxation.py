@@ -346,8 +346,10 @@ def _first_above(values: FloatArray, floor: float) -> float | None:
 
 
 def _bare(scene: Scene) -> Scene:
-    """Return the scene without contact, whose scales are not needed here."""
-    return scene if scene.contact is None else scene.replace(contact=None)
+    """Return the scene without contact and walls, which are not needed here."""
+    if scene.contact is None and not scene.walls:
+        return scene
+    return scene.replace(contact=None, walls=())
 
 
 def slender_coefficients(scene: Scene) -> FloatArray:

@@ -1,14 +1,16 @@
-//! What can touch: edges and spheres, in one numbering.
+//! What can touch: edges, spheres and walls, in one numbering.
 //!
 //! A sphere, such as a head, is an edge of no length whose two nodes are the same; broad phase, exclusion and distances then treat
-//! both alike. The edges come first.
+//! both alike. The edges come first. Walls, which come last, touch nodes of the others and never each other.
 
 use std::fmt;
 
 use super::barrier::Barrier;
 use super::exclusion::Exclusion;
 use super::pair::Pair;
+use super::wall::WallContact;
 use crate::Vec3;
+use crate::plane::Plane;
 
 /// A body that can touch others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +19,8 @@ pub enum Body {
     Edge(usize),
     /// A sphere by its place in the list of spheres.
     Sphere(usize),
+    /// A wall by its place in the list of walls.
+    Wall(usize),
 }
 
 impl fmt::Display for Body {
@@ -24,11 +28,12 @@ impl fmt::Display for Body {
         match self {
             Self::Edge(edge) => write!(f, "edge {edge}"),
             Self::Sphere(sphere) => write!(f, "sphere {sphere}"),
+            Self::Wall(wall) => write!(f, "wall {wall}"),
         }
     }
 }
 
-/// All edges and spheres of a scene; constant.
+/// All edges, spheres and walls of a scene; constant.
 #[derive(Clone, Debug)]
 pub struct Bodies {
     ends: Vec<[usize; 2]>,
@@ -37,6 +42,7 @@ pub struct Bodies {
     colliding: Vec<bool>,
     exclusion: Exclusion,
     edge_count: usize,
+    walls: Vec<Plane>,
     /// Colliding edges that meet in node `n` are `incident[first[n]..first[n + 1]]`.
     first: Vec<usize>,
     incident: Vec<u32>,
@@ -64,7 +70,59 @@ impl Bodies {
         let colliding: Vec<_> = colliding.iter().copied().chain(spheres.iter().map(|_| true)).collect();
         let exclusion = Exclusion::new(node_count, &ends, &rest_lengths, &radius, exclusion);
         let (first, incident) = incident_edges(node_count, edges, &colliding);
-        Self { ends, radius, rest_lengths, colliding, exclusion, edge_count: edges.len(), first, incident }
+        Self {
+            ends,
+            radius,
+            rest_lengths,
+            colliding,
+            exclusion,
+            edge_count: edges.len(),
+            walls: Vec::new(),
+            first,
+            incident,
+        }
+    }
+
+    /// The same bodies, and walls that keep them on their side.
+    pub fn with_walls(self, walls: Vec<Plane>) -> Self {
+        Self { walls, ..self }
+    }
+
+    /// Number of bodies, walls included.
+    pub fn count(&self) -> usize {
+        self.ends.len() + self.walls.len()
+    }
+
+    /// Every end of a colliding edge, every sphere, and every wall that may push it: the two bodies, and which end.
+    pub fn at_walls(&self) -> impl Iterator<Item = ([usize; 2], usize)> + '_ {
+        let walls = self.ends.len()..self.count();
+        walls.flat_map(move |wall| {
+            let touching = (0..self.ends.len()).filter(|&body| self.colliding[body]);
+            touching.flat_map(move |body| {
+                let ends = if self.is_sphere(body) { 0..1 } else { 0..2 };
+                ends.map(move |end| ([body, wall], end))
+            })
+        })
+    }
+
+    /// The wall of an index.
+    pub fn wall(&self, index: usize) -> &Plane {
+        &self.walls[index - self.ends.len()]
+    }
+
+    /// The contact of a body's end with a wall under the tolerance `delta`.
+    pub fn wall_contact(&self, [body, wall]: [usize; 2], end: usize, delta: f64) -> WallContact {
+        let (plane, radius) = (*self.wall(wall), self.radius[body]);
+        if self.is_sphere(body) {
+            WallContact::of_sphere(plane, radius, delta)
+        } else {
+            WallContact::of_end(plane, radius, delta, self.rest_lengths[body], end)
+        }
+    }
+
+    /// Sum of the radii of two bodies, m; a wall has none.
+    pub fn thickness(&self, bodies: [usize; 2]) -> f64 {
+        bodies.iter().filter_map(|&body| self.radius.get(body)).sum()
     }
 
     /// Nodes of every body; a sphere's is given twice.
@@ -72,7 +130,7 @@ impl Bodies {
         &self.ends
     }
 
-    /// Radius of every body, m.
+    /// Radius of every body but walls, m.
     pub fn radius(&self) -> &[f64] {
         &self.radius
     }
@@ -102,7 +160,13 @@ impl Bodies {
 
     /// What the body of an index is.
     pub fn body(&self, index: usize) -> Body {
-        if index < self.edge_count { Body::Edge(index) } else { Body::Sphere(index - self.edge_count) }
+        if index < self.edge_count {
+            Body::Edge(index)
+        } else if index < self.ends.len() {
+            Body::Sphere(index - self.edge_count)
+        } else {
+            Body::Wall(index - self.ends.len())
+        }
     }
 
     /// The index of a body.
@@ -110,6 +174,7 @@ impl Bodies {
         match body {
             Body::Edge(edge) => edge,
             Body::Sphere(sphere) => self.edge_count + sphere,
+            Body::Wall(wall) => self.ends.len() + wall,
         }
     }
 
@@ -119,7 +184,7 @@ impl Bodies {
 
     /// The distances between which a pair acts under the tolerance `delta`.
     pub fn barrier(&self, [a, b]: [usize; 2], delta: f64) -> Barrier {
-        Barrier::new(self.radius[a] + self.radius[b], delta)
+        Barrier::new(self.thickness([a, b]), delta)
     }
 
     /// Positions of the nodes `a0, a1, b0, b1` of a pair.

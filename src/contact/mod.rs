@@ -13,7 +13,8 @@
 //! each other's cores: [`potential`] is the way in. Below it, [`bodies`] numbers what can touch;
 //! [`candidates`] keeps the near pairs; [`pair`] is the energy of one of them, made of a
 //! [`barrier`] on each [`separation`], weighted by their [`angle`]; [`continuous`] cuts a step before
-//! a core is reached; [`friction`] acts on each contact with its [`push`]; [`stiffness`] says how stiff a pair is.
+//! a core is reached; [`friction`] acts on each contact with its [`push`]; [`stiffness`] says how stiff a pair is. [`wall`] keeps nodes on their side of a plane; an
+//! `element` is either a pair or a node at a wall.
 
 pub mod angle;
 pub mod barrier;
@@ -22,6 +23,7 @@ pub mod broad_phase;
 pub mod candidates;
 pub mod continuous;
 pub mod distance;
+mod element;
 pub mod exclusion;
 pub mod friction;
 pub mod pair;
@@ -30,3 +32,4 @@ pub mod push;
 pub mod separation;
 pub mod spillmann;
 pub mod stiffness;
+pub mod wall;

@@ -8,10 +8,9 @@ use super::bodies::{Bodies, Body};
 use super::candidates::Candidates;
 use super::continuous::safe_part;
 use super::distance::segment_distance;
+use super::element::{Element, Shape};
 use super::friction::{Friction, SlidingContact};
-use super::pair::{Curvature, Pair};
-use super::push::Push;
-use super::separation::{Gradient12, Hessian12};
+use super::pair::Curvature;
 use super::stiffness::Stiffness;
 use crate::Vec3;
 
@@ -37,7 +36,7 @@ pub struct BarrierLaw {
 #[derive(Clone)]
 pub struct BarrierState {
     candidates: Candidates,
-    /// Of the candidates, in their order.
+    /// Those at walls, which stay, then those of the candidates, in their order.
     elements: Vec<Element>,
     /// Contacts that push at the positions of the last [`BarrierLaw::find_sliding`], and their elements.
     sliding: Vec<(usize, SlidingContact)>,
@@ -61,18 +60,6 @@ pub struct FrictionDerivative {
     pub rate: f64,
     /// The exact one, or the part that is symmetric and positive semidefinite: that of the velocities.
     pub curvature: Curvature,
-}
-
-#[derive(Clone)]
-struct Element {
-    bodies: [usize; 2],
-    pair: Pair,
-    nodes: [usize; 4],
-    rows: [usize; 4],
-    count: usize,
-    stiffness: f64,
-    /// Smoothing velocity of friction, m/s.
-    slip_velocity: f64,
 }
 
 /// Two bodies and how far apart they are.
@@ -136,7 +123,7 @@ impl BarrierLaw {
     /// # Panics
     /// Unless there is one for every body.
     pub fn with_slip_velocities(self, slip_velocities: Vec<f64>) -> Self {
-        assert_eq!(slip_velocities.len(), self.bodies.radius().len(), "one slip velocity per body");
+        assert_eq!(slip_velocities.len(), self.bodies.count(), "one slip velocity per body");
         Self { slip_velocities, ..self }
     }
 
@@ -152,12 +139,12 @@ impl BarrierLaw {
 
     /// Stiffness `kappa` of a pair, Pa.
     pub fn stiffness(&self, [a, b]: [usize; 2]) -> f64 {
-        self.stiffness.of([a, b], self.bodies.radius()[a] + self.bodies.radius()[b], self.delta)
+        self.stiffness.of([a, b], self.bodies.thickness([a, b]), self.delta)
     }
 
     /// The stiffness (Pa) with which a pair that touches at a point holds a force (N) at the sum of its radii.
     pub fn stiffness_to_hold(&self, [a, b]: [usize; 2], force: f64) -> f64 {
-        let thickness = self.bodies.radius()[a] + self.bodies.radius()[b];
+        let thickness = self.bodies.thickness([a, b]);
         let reach = thickness * (2.0 * self.delta).sqrt();
         force / (reach * self.bodies.barrier([a, b], self.delta).at(thickness).slope.abs())
     }
@@ -180,7 +167,8 @@ impl BarrierLaw {
     /// A state without pairs; [`Self::ensure`] fills it.
     pub fn state(&self) -> BarrierState {
         let candidates = Candidates::new(&self.bodies, self.delta, self.skin);
-        BarrierState { candidates, elements: Vec::new(), sliding: Vec::new(), widening: 1.0 }
+        let elements = self.at_walls().collect();
+        BarrierState { candidates, elements, sliding: Vec::new(), widening: 1.0 }
     }
 
     /// Makes the state's elements hold every pair in range of `nodes` (m), and says whether they have changed, and with them the
@@ -200,29 +188,52 @@ impl BarrierLaw {
 
     /// Makes elements of the near pairs; whether they have changed.
     fn list_elements(&self, state: &mut BarrierState) -> bool {
-        let pairs = state.candidates.pairs();
-        if pairs.iter().eq(state.elements.iter().map(|element| &element.bodies)) {
+        let (pairs, at_walls) = (state.candidates.pairs(), self.bodies.at_walls().count());
+        if pairs.iter().eq(state.elements[at_walls..].iter().map(|element| &element.bodies)) {
             return false;
         }
         state.sliding.clear();
-        state.elements.clear();
+        state.elements.truncate(at_walls);
         state.elements.extend(pairs.iter().map(|&bodies| self.element(bodies)));
         true
     }
 
     fn element(&self, bodies: [usize; 2]) -> Element {
-        let (nodes, count) = self.bodies.stencil(bodies);
-        let (rows, _) = self.bodies.rows(bodies);
+        let ((nodes, count), (rows, _)) = (self.bodies.stencil(bodies), self.bodies.rows(bodies));
+        let ([a0, a1], [b0, b1]) = (self.bodies.ends()[bodies[0]], self.bodies.ends()[bodies[1]]);
+        let (corners, shape) = ([a0, a1, b0, b1], Shape::Pair(self.bodies.pair(bodies, self.delta)));
+        let (stiffness, slip_velocity) = (self.stiffness(bodies), self.slip_velocity(bodies));
+        Element { bodies, shape, corners, rows, nodes, count, stiffness, slip_velocity }
+    }
+
+    /// Elements of all nodes that walls may push; there are few, and each is a single node's, so none is ever left out.
+    fn at_walls(&self) -> impl Iterator<Item = Element> + '_ {
+        self.bodies.at_walls().map(|(bodies, end)| {
+            let node = self.bodies.ends()[bodies[0]][end];
+            let shape = Shape::Wall(self.bodies.wall_contact(bodies, end, self.delta));
+            let (stiffness, slip_velocity) = (self.stiffness(bodies), self.slip_velocity(bodies));
+            Element {
+                bodies,
+                shape,
+                corners: [node; 4],
+                rows: [0; 4],
+                nodes: [node; 4],
+                count: 1,
+                stiffness,
+                slip_velocity,
+            }
+        })
+    }
+
+    fn slip_velocity(&self, bodies: [usize; 2]) -> f64 {
         let own = |body: usize| self.slip_velocities.get(body).copied();
         let common = self.friction.map_or(f64::INFINITY, |friction| friction.smoothing_velocity);
-        let slip_velocity = own(bodies[0]).zip(own(bodies[1])).map_or(common, |(a, b)| a.max(b));
-        let (pair, stiffness) = (self.bodies.pair(bodies, self.delta), self.stiffness(bodies));
-        Element { bodies, pair, nodes, rows, count, stiffness, slip_velocity }
+        own(bodies[0]).zip(own(bodies[1])).map_or(common, |(a, b)| a.max(b))
     }
 
     /// Energy, J; infinite if a pair is at its least distance or below.
     pub fn energy(&self, state: &BarrierState, nodes: &[Vec3]) -> f64 {
-        state.elements.iter().map(|e| e.stiffness * e.pair.energy(&self.bodies.corners(e.bodies, nodes))).sum()
+        state.elements.iter().map(|element| element.stiffness * element.energy(nodes)).sum()
     }
 
     /// Hands the gradient (N) and, if asked for, the second derivative (N/m, column by column) of every element in range to
@@ -237,8 +248,7 @@ impl BarrierLaw {
         mut add: impl FnMut(usize, &[f64], Option<&[f64]>),
     ) {
         for (index, element) in state.elements.iter().enumerate() {
-            let x = self.bodies.corners(element.bodies, nodes);
-            let Some(at) = element.pair.evaluate(&x, curvature) else { continue };
+            let Some(at) = element.evaluate(nodes, curvature) else { continue };
             let gradient = at.gradient * element.stiffness;
             let hessian = curvature.map(|_| at.hessian * element.stiffness);
             element.hand_over(&gradient, hessian.as_ref(), |gradient, matrix| add(index, gradient, matrix));
@@ -249,10 +259,7 @@ impl BarrierLaw {
     pub fn find_sliding(&self, state: &mut BarrierState, nodes: &[Vec3]) {
         state.sliding.clear();
         if self.friction.is_some() {
-            let pushing = |(index, element): (usize, &Element)| {
-                let push = element.pair.push(&self.bodies.corners(element.bodies, nodes))?;
-                Some((index, self.contact(element, &push)?))
-            };
+            let pushing = |(index, element): (usize, &Element)| Some((index, element.contact(&element.push(nodes)?)?));
             state.sliding.extend(state.elements.iter().enumerate().filter_map(pushing));
         }
     }
@@ -289,8 +296,7 @@ impl BarrierLaw {
             let gradient = contact.gradient(friction, &velocities);
             let hessian = derivative.map(|FrictionDerivative { rate, curvature }| {
                 let mut matrix = contact.hessian(friction, &velocities) * rate;
-                let x = self.bodies.corners(element.bodies, nodes);
-                if let (Curvature::Exact, Some((_, variation))) = (curvature, element.pair.push_with_variation(&x)) {
+                if let (Curvature::Exact, Some((_, variation))) = (curvature, element.push_with_variation(nodes)) {
                     matrix += contact.position_derivative(friction, &velocities, &variation, element.stiffness);
                 }
                 matrix
@@ -351,16 +357,27 @@ impl BarrierLaw {
             let least = self.bodies.barrier(pair, self.delta).least();
             safe_part(&self.bodies.corners(pair, from), &self.bodies.corners(pair, to), least, limit)
         };
+        let at_walls = self.bodies.at_walls().map(|(bodies, end)| {
+            let node = self.bodies.ends()[bodies[0]][end];
+            self.bodies.wall_contact(bodies, end, self.delta).safe_part(&from[node], &to[node])
+        });
+        let limit = at_walls.fold(1.0, f64::min);
         if listed {
-            state.candidates.pairs().iter().fold(1.0, |limit, &pair| shorten(limit, pair))
+            state.candidates.pairs().iter().fold(limit, |limit, &pair| shorten(limit, pair))
         } else {
             let pairs = state.candidates.swept(from, to);
-            pairs.iter().fold(1.0, |limit, &pair| shorten(limit, pair.map(|body| body as usize)))
+            pairs.iter().fold(limit, |limit, &pair| shorten(limit, pair.map(|body| body as usize)))
         }
     }
 
-    /// The pair whose surfaces are closest; `None` if no pair may touch.
+    /// The pair whose surfaces are closest, walls included; `None` if nothing may touch.
     pub fn smallest_gap(&self, state: &mut BarrierState, nodes: &[Vec3]) -> Option<Approach> {
+        let nearest = |a: &Approach, b: &Approach| a.gap().total_cmp(&b.gap());
+        let at_wall = self.approaches_to_walls(nodes).min_by(nearest);
+        self.smallest_gap_of_pairs(state, nodes).into_iter().chain(at_wall).min_by(nearest)
+    }
+
+    fn smallest_gap_of_pairs(&self, state: &mut BarrierState, nodes: &[Vec3]) -> Option<Approach> {
         let listed = self.closest(state.candidates.pairs().iter().copied(), nodes);
         // A pair outside the list was further than the range and the skin when it was made.
         let known = 2.0 * (self.delta * self.bodies.thinnest() + state.candidates.slack(nodes));
@@ -393,16 +410,25 @@ impl BarrierLaw {
             let approach = self.approach(pair, nodes);
             (approach.distance <= self.bodies.barrier(pair, self.delta).least()).then_some(approach)
         });
-        overlapping.min_by(deepest)
+        let least = 1.0 - self.delta;
+        let behind = self.approaches_to_walls(nodes).filter(|near| near.distance <= least * near.thickness);
+        overlapping.chain(behind).min_by(deepest)
+    }
+
+    fn approaches_to_walls<'a>(&'a self, nodes: &'a [Vec3]) -> impl Iterator<Item = Approach> + 'a {
+        self.bodies.at_walls().map(|(bodies, end)| Approach {
+            bodies: bodies.map(|body| self.bodies.body(body)),
+            distance: self.bodies.wall(bodies[1]).height(&nodes[self.bodies.ends()[bodies[0]][end]]),
+            thickness: self.bodies.thickness(bodies),
+        })
     }
 
     fn approach(&self, pair: [usize; 2], nodes: &[Vec3]) -> Approach {
         let x = self.bodies.corners(pair, nodes);
-        let [a, b] = pair;
         Approach {
             bodies: pair.map(|body| self.bodies.body(body)),
             distance: segment_distance(&x[0], &x[1], &x[2], &x[3]).distance,
-            thickness: self.bodies.radius()[a] + self.bodies.radius()[b],
+            thickness: self.bodies.thickness(pair),
         }
     }
 
@@ -412,48 +438,10 @@ impl BarrierLaw {
     }
 
     fn force(&self, element: &Element, nodes: &[Vec3]) -> Option<ContactForce> {
-        let push = element.pair.push(&self.bodies.corners(element.bodies, nodes))?;
-        let contact = self.contact(element, &push)?;
+        let push = element.push(nodes)?;
+        let contact = element.contact(&push)?;
         let bodies = element.bodies.map(|body| self.bodies.body(body));
         Some(ContactForce { bodies, places: push.places, force: push.force * element.stiffness, contact })
-    }
-
-    fn contact(&self, element: &Element, push: &Push) -> Option<SlidingContact> {
-        let (size, [s, t]) = (push.force.norm(), push.places);
-        let ([a0, a1], [b0, b1]) = (self.bodies.ends()[element.bodies[0]], self.bodies.ends()[element.bodies[1]]);
-        (size > 0.0).then(|| SlidingContact {
-            nodes: [a0, a1, b0, b1],
-            weights: [1.0 - s, s, t - 1.0, -t],
-            normal: push.force / size,
-            force: element.stiffness * size,
-        })
-    }
-}
-
-impl Element {
-    /// Hands over what belongs to distinct nodes, column by column.
-    #[inline]
-    fn hand_over(
-        &self,
-        gradient: &Gradient12,
-        hessian: Option<&Hessian12>,
-        mut add: impl FnMut(&[f64], Option<&[f64]>),
-    ) {
-        let width = 3 * self.count;
-        let row_of = |i: usize| 3 * self.rows[i / 3] + i % 3;
-        let (mut vector, mut matrix) = ([0.0; 12], [0.0; 144]);
-        for i in 0..width {
-            vector[i] = gradient[row_of(i)];
-        }
-        let matrix = hessian.map(|hessian| {
-            for j in 0..width {
-                for i in 0..width {
-                    matrix[j * width + i] = hessian[(row_of(i), row_of(j))];
-                }
-            }
-            &matrix[..width * width]
-        });
-        add(&vector[..width], matrix);
     }
 }
 

@@ -10,7 +10,7 @@
 //! * [`rft`]: resistive force theory, local drag coefficients along and across every edge.
 //! * [`ambient`]: prescribed background flows.
 //! * [`twist_drag`]: resistance of an edge to spinning about its own centreline.
-//! * [`head`]: drag of a head, and its couple about all axes.
+//! * [`head`]: drag of a head, and and its couple about all axes.
 
 pub mod ambient;
 pub mod far_field;

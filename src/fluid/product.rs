@@ -4,8 +4,9 @@
 use rayon::ThreadPool;
 
 use super::far_field::{FarField, FarFieldError};
+use super::kernel::Boundary;
+use super::kernel::network::Segments;
 use super::stokeslet::mobility;
-use crate::Vec3;
 use crate::linear::LinearError;
 use crate::linear::dense::{DenseLu, multiply};
 use crate::linear::krylov::{Gmres, LinearOperator};
@@ -61,19 +62,25 @@ impl Product {
         matches!(self, Self::Stored { .. })
     }
 
-    /// Moves to a geometry.
+    /// Moves to a geometry; with a boundary there is a matrix.
     pub fn update(
         &mut self,
-        nodes: &[Vec3],
-        edges: &[[usize; 2]],
-        epsilon: &[f64],
+        segments: Segments<'_>,
+        boundary: Option<&Boundary>,
         pool: Option<&ThreadPool>,
     ) -> Result<(), LinearError> {
+        let Segments { nodes, edges, epsilon } = segments;
         match self {
             Self::Stored { matrix, single, factored, .. } => {
                 mobility(nodes, nodes, edges, epsilon, matrix, pool);
+                if let Some(boundary) = boundary {
+                    boundary.add_to_mobility(segments, nodes, matrix, pool);
+                }
                 single.rounded = false;
                 *factored = false;
+            }
+            Self::Fast { .. } if boundary.is_some() => {
+                return Err(LinearError::Product("near a wall they are made with the matrix".to_owned()));
             }
             Self::Fast { far_field: Some(far_field), .. } => far_field.update(nodes, None, pool)?,
             Self::Fast { error, far_field, .. } => {

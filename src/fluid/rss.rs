@@ -4,6 +4,8 @@
 //! (the explicit scheme, resistance matrices) it is factored by LU, or, in scenes too large for a matrix, applied by GMRES;
 //! `W` holds the integrals of products of hat functions, so that total force and torque are exact (docs/theory, "Fluid").
 
+use super::kernel::Boundary;
+use super::kernel::network::Segments;
 use super::product::{FarFieldChoice, Product};
 use super::rft::ResistiveForce;
 use super::stokeslet::HatWeights;
@@ -25,6 +27,7 @@ pub struct StokesletSegments {
     gram: Gram,
     scratch: Vec<f64>,
     local: ResistiveForce,
+    boundary: Option<Boundary>,
 }
 
 impl StokesletSegments {
@@ -55,7 +58,28 @@ impl StokesletSegments {
             edges: own_edges,
             viscosity,
             positions,
+            boundary: None,
         })
+    }
+
+    /// The same model in a fluid that ends at a boundary. Its products take a matrix, whatever the size of the scene; the local drag,
+    /// which preconditions, stays that of unbounded fluid.
+    pub fn with_boundary(self, boundary: Boundary) -> Self {
+        let product = Product::new(self.nodes.len(), &FarFieldChoice::NEVER);
+        Self { product, boundary: Some(boundary), ..self }
+    }
+
+    /// Checks that all of the filament is where the fluid is.
+    fn check_side(&self) -> Result<(), LinearError> {
+        let Some(boundary) = &self.boundary else { return Ok(()) };
+        let heights = self.positions.iter().map(|position| boundary.plane().height(position));
+        match self.nodes.iter().zip(heights).find(|(_, height)| height.is_nan() || *height <= 0.0) {
+            Some((node, height)) => Err(LinearError::Product(format!(
+                "node {node} is {:.3e} m behind the wall, where there is no fluid; with a Contact, rods stay on their side",
+                -height
+            ))),
+            None => Ok(()),
+        }
     }
 }
 
@@ -72,7 +96,9 @@ impl FluidModel for StokesletSegments {
         for (position, &node) in self.positions.iter_mut().zip(&self.nodes) {
             *position = nodes[node];
         }
-        self.product.update(&self.positions, &self.edges, &self.epsilon, pool)?;
+        self.check_side()?;
+        let segments = Segments { nodes: &self.positions, edges: &self.edges, epsilon: &self.epsilon };
+        self.product.update(segments, self.boundary.as_ref(), pool)?;
         self.weights.update(&self.positions);
         self.gram.update(&self.positions, &self.edges)?;
         self.local.update(nodes, pool)

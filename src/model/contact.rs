@@ -9,7 +9,7 @@ use crate::contact::exclusion::Exclusion;
 use crate::contact::friction::Friction;
 use crate::contact::potential::BarrierLaw;
 use crate::contact::spillmann::ContactLaw;
-use crate::model::specification::{ContactMethodSpecification, ContactSpecification};
+use crate::model::specification::{ContactMethodSpecification, ContactSpecification, Specification};
 use crate::rod::network::Network;
 
 /// The method and its constants.
@@ -43,11 +43,16 @@ impl fmt::Display for Overlap {
 }
 
 impl ContactModel {
-    /// The method of a specification; lengths in m, one rest length and radius per edge.
-    pub fn new(specification: &ContactSpecification, network: &Network, rest_lengths: &[f64], radius: &[f64]) -> Self {
-        let (count, edges, exclusion) = (network.node_count(), network.edges(), specification.exclusion);
-        let colliding = &specification.colliding;
-        match &specification.method {
+    /// The method that is specified, for a scene with these rest lengths of edges, m.
+    pub fn new(
+        contact: &ContactSpecification,
+        specification: &Specification,
+        network: &Network,
+        rest_lengths: &[f64],
+    ) -> Self {
+        let (count, edges, exclusion) = (network.node_count(), network.edges(), contact.exclusion);
+        let (colliding, radius) = (&contact.colliding, &specification.radius);
+        match &contact.method {
             &ContactMethodSpecification::SpillmannTeschner { tolerance, max_iterations } => {
                 let exclusion = Exclusion::new(count, edges, rest_lengths, radius, exclusion);
                 let law = ContactLaw::new(edges, radius, exclusion, colliding, tolerance, max_iterations);
@@ -55,6 +60,7 @@ impl ContactModel {
             }
             ContactMethodSpecification::Barrier { tolerance, stiffness, friction, slip_velocities, spheres } => {
                 let bodies = Bodies::new(count, edges, radius, rest_lengths, colliding, spheres, exclusion);
+                let bodies = bodies.with_walls(specification.walls.iter().map(|wall| wall.plane).collect());
                 let law = BarrierLaw::new(bodies, *tolerance, 1.0).with_stiffness(stiffness.clone());
                 let sliding = Friction { coefficient: *friction, smoothing_velocity: f64::INFINITY };
                 Self::Barrier(Arc::new(if *friction > 0.0 {

@@ -37,7 +37,9 @@ use crate::model::filaments::Filaments;
 use crate::model::parts::parts;
 use crate::model::round_off::RoundOff;
 use crate::model::scene_terms::{dissipative_terms, load_terms, masses, regularization, spin_resistances, weights};
-use crate::model::specification::{FluidModelSpecification, Specification};
+use crate::model::specification::{
+    ContactMethodSpecification, ContactSpecification, FluidModelSpecification, Specification, WallSpecification,
+};
 use crate::model::storage::Storage;
 use crate::rod::assembly::{Assembly, HingeElement, Increment};
 use crate::rod::configuration::{Configuration, ShaftAngle};
@@ -163,7 +165,7 @@ impl Model {
         let contact = specification
             .contact
             .as_ref()
-            .map(|contact| ContactModel::new(contact, &network, &rest.lengths, &specification.radius));
+            .map(|contact| ContactModel::new(contact, &specification, &network, &rest.lengths));
         let held: Vec<bool> = (0..network.node_count()).map(|k| prescribed[network.node_dofs()[k]]).collect();
         let (part_of_node, mut free_parts) = parts(network.edges(), &held, contact.is_some());
         let turned = network.edges().iter().zip(network.edge_dofs()).filter(|(_, dof)| prescribed[**dof]);
@@ -252,9 +254,9 @@ impl Model {
         &self.filaments
     }
 
-    /// Number of bodies that contact knows: edges, and with barrier contact spheres.
+    /// Number of bodies that contact knows: edges, and with barrier contact spheres and walls.
     pub fn body_count(&self) -> usize {
-        self.barrier().map_or(self.network.edges().len(), |law| law.bodies().radius().len())
+        self.barrier().map_or(self.network.edges().len(), |law| law.bodies().count())
     }
 
     /// Number of degrees of freedom, free motor angles last.
@@ -306,7 +308,12 @@ impl Model {
             FluidModelSpecification::StokesletSegments { epsilon, far_field } => {
                 let local = preconditioner_drag(fluid.viscosity, &self.specification, epsilon);
                 let (immersed, far_field) = (&fluid.immersed, choice.unwrap_or(far_field));
-                Box::new(StokesletSegments::new(nodes, edges, immersed, epsilon, fluid.viscosity, &local, far_field)?)
+                let model =
+                    StokesletSegments::new(nodes, edges, immersed, epsilon, fluid.viscosity, &local, far_field)?;
+                Box::new(match self.specification.boundary() {
+                    Some(boundary) => model.with_boundary(boundary),
+                    None => model,
+                })
             }
         }))
     }
@@ -363,6 +370,7 @@ fn check(specification: &Specification) -> Result<(), ModelError> {
         let (field, value) = ("head.edges".to_owned(), head.edges.len() as f64);
         return Err(ModelError::Value { field, value, allowed: "1 to 6 edges fixed to the head" });
     }
+    check_walls(specification)?;
     for (k, ei) in specification.bending.iter().enumerate() {
         let determinant = ei[0][0] * ei[1][1] - ei[0][1] * ei[1][0];
         if !(ei[0][0] > 0.0 && determinant > 0.0 && ei[0][1] == ei[1][0]) {
@@ -374,6 +382,25 @@ fn check(specification: &Specification) -> Result<(), ModelError> {
         }
     }
     Ok(())
+}
+
+fn check_walls(specification: &Specification) -> Result<(), ModelError> {
+    let count = specification.walls.len();
+    let felt = specification.walls.iter().filter_map(WallSpecification::boundary).count();
+    let spillmann =
+        |contact: &ContactSpecification| matches!(contact.method, ContactMethodSpecification::SpillmannTeschner { .. });
+    let allowed = match specification.fluid.as_ref().map(|fluid| &fluid.model) {
+        Some(FluidModelSpecification::ResistiveForce { .. }) if felt > 0 => {
+            "none that the fluid feels, with resistive force theory"
+        }
+        Some(_) if felt > 0 && specification.head.as_ref().is_some_and(|head| head.translation > 0.0) => {
+            "none that the fluid feels, with a point head, which stirs no flow"
+        }
+        Some(_) if felt > 1 => "at most one that the fluid feels",
+        _ if count > 0 && specification.contact.as_ref().is_some_and(spillmann) => "none, with this contact method",
+        _ => return Ok(()),
+    };
+    Err(ModelError::Value { field: "walls".to_owned(), value: count as f64, allowed })
 }
 
 struct RestShape {

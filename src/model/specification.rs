@@ -5,8 +5,10 @@ use crate::fluid::ambient::AmbientFlow;
 use crate::fluid::ambient::function::{FlowFunction, GivenFlow};
 use crate::fluid::ambient::linear::LinearFlow;
 use crate::fluid::ambient::poiseuille::Poiseuille;
+use crate::fluid::kernel::Boundary;
 use crate::fluid::product::FarFieldChoice;
 use crate::kinematics::clamp::Motion;
+use crate::plane::Plane;
 use crate::signal::Signal;
 use crate::{Mat3, Vec3};
 
@@ -49,6 +51,37 @@ pub struct ClampSpecification {
     pub axes: [bool; 3],
     /// How they move.
     pub motion: Motion,
+}
+
+/// What a wall is to the fluid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WallKind {
+    /// The fluid is at rest on it.
+    NoSlip,
+    /// It bears no shear.
+    FreeSurface,
+    /// The fluid does not feel it; only contact does.
+    Contact,
+}
+
+/// A plane wall; all is on the side its normal points to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallSpecification {
+    /// Where it is.
+    pub plane: Plane,
+    /// What it is to the fluid.
+    pub kind: WallKind,
+}
+
+impl WallSpecification {
+    /// The boundary of the fluid that it is, if it is one.
+    pub fn boundary(&self) -> Option<Boundary> {
+        match self.kind {
+            WallKind::NoSlip => Some(Boundary::NoSlip(self.plane)),
+            WallKind::FreeSurface => Some(Boundary::FreeSurface(self.plane)),
+            WallKind::Contact => None,
+        }
+    }
 }
 
 /// The drag model on the immersed edges.
@@ -185,6 +218,13 @@ pub struct MagnetismSpecification {
     pub gradient: Mat3,
 }
 
+impl Specification {
+    /// The boundary of the fluid, if there is one.
+    pub fn boundary(&self) -> Option<Boundary> {
+        self.walls.iter().find_map(WallSpecification::boundary)
+    }
+}
+
 /// A background flow.
 #[derive(Clone)]
 pub enum FlowSpecification {
@@ -285,6 +325,8 @@ pub struct Specification {
     pub loads: Vec<LoadSpecification>,
     /// Magnetised edges and the field they are in.
     pub magnetism: Option<MagnetismSpecification>,
+    /// Plane walls.
+    pub walls: Vec<WallSpecification>,
     /// Background flows; they add up.
     pub flows: Vec<FlowSpecification>,
     /// Gravity, m/s^2.

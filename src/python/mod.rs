@@ -7,7 +7,7 @@
 //! * [`loads`]: loads, magnetism and background flows from mappings.
 //! * [`body`]: the surface of a rigid body.
 //! * [`far_field`]: the product with the mobility without its matrix.
-//! * [`numerics`]: mobility, velocity and distances on plain arrays.
+//! * [`numerics`]: mobility, velocity and distances on plain arrays; [`walls`]: walls from mappings.
 //! * [`errors`]: errors of the core as Python exceptions.
 //! * [`arrays`]: positions and indices in and out of NumPy.
 
@@ -24,6 +24,7 @@ mod rollout;
 mod simulation;
 mod specification;
 mod state;
+mod walls;
 
 use pyo3::prelude::*;
 
@@ -36,6 +37,7 @@ fn _flagrs(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<body::BodySurface>()?;
     module.add_function(wrap_pyfunction!(numerics::mobility, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::velocity, module)?)?;
+    module.add_function(wrap_pyfunction!(numerics::image_velocity, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::hat_weights, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::segment_distance, module)?)?;
     module.add_function(wrap_pyfunction!(numerics::thread_count, module)?)?;

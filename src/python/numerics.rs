@@ -5,7 +5,10 @@ use pyo3::prelude::*;
 
 use super::arrays::{from_points, pairs, points, values};
 use super::errors::scene_error;
+use super::walls::WallInput;
 use crate::contact::distance::segment_distance as distance;
+use crate::fluid::kernel::Boundary;
+use crate::fluid::kernel::network::Segments;
 use crate::fluid::stokeslet;
 use crate::runtime::threads;
 
@@ -28,8 +31,10 @@ pub fn mobility<'py>(
     edges: PyReadonlyArray2<'py, i64>,
     epsilon: PyReadonlyArray1<'py, f64>,
     targets: PyReadonlyArray2<'py, f64>,
+    wall: Option<WallInput>,
     threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let boundary = boundary(py, wall)?;
     let nodes = points(py, "nodes", &nodes)?;
     let targets = points(py, "targets", &targets)?;
     let edges = pairs(py, "edges", &edges, nodes.len())?;
@@ -38,9 +43,17 @@ pub fn mobility<'py>(
     py.detach(|| {
         let pool = threads::pool(threads);
         stokeslet::mobility(&targets, &nodes, &edges, &epsilon, &mut out, pool.as_deref());
+        if let Some(boundary) = boundary {
+            let segments = Segments { nodes: &nodes, edges: &edges, epsilon: &epsilon };
+            boundary.add_to_mobility(segments, &targets, &mut out, pool.as_deref());
+        }
     });
     PyArray1::from_vec(py, out)
         .reshape_with_order([3 * targets.len(), 3 * nodes.len()], numpy::npyffi::NPY_ORDER::NPY_FORTRANORDER)
+}
+
+fn boundary(py: Python<'_>, wall: Option<WallInput>) -> PyResult<Option<Boundary>> {
+    Ok(wall.map(|wall| wall.specification(py)).transpose()?.and_then(|wall| wall.boundary()))
 }
 
 /// Velocity at the points, (M, 3), for a force density over `8 pi mu`.
@@ -63,6 +76,37 @@ pub fn velocity<'py>(
     py.detach(|| {
         let pool = threads::pool(threads);
         stokeslet::velocity(&at, &nodes, &edges, &density, &epsilon, &mut out, pool.as_deref());
+    });
+    from_points(py, &out)
+}
+
+/// Nodes, edges and regularizations of segments.
+type SegmentArrays<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, i64>, PyReadonlyArray1<'py, f64>);
+
+/// What the images behind a wall add to the velocity at the points, (M, 3), of a force density over 8 pi mu.
+#[pyfunction]
+pub fn image_velocity<'py>(
+    py: Python<'py>,
+    at: PyReadonlyArray2<'py, f64>,
+    segments: SegmentArrays<'py>,
+    density: PyReadonlyArray2<'py, f64>,
+    wall: WallInput,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (nodes, edges, epsilon) = segments;
+    let at = points(py, "points", &at)?;
+    let nodes = points(py, "nodes", &nodes)?;
+    let density = points(py, "force_density", &density)?;
+    let edges = pairs(py, "edges", &edges, nodes.len())?;
+    let epsilon = regularizations(py, &epsilon, edges.len())?;
+    let boundary = boundary(py, Some(wall))?;
+    let mut out = vec![crate::Vec3::zeros(); at.len()];
+    py.detach(|| {
+        let pool = threads::pool(threads);
+        if let Some(boundary) = boundary {
+            let segments = Segments { nodes: &nodes, edges: &edges, epsilon: &epsilon };
+            boundary.add_to_velocity(segments, &density, &at, &mut out, pool.as_deref());
+        }
     });
     from_points(py, &out)
 }

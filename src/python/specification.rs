@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use super::arrays::{pairs, points, values};
 use super::errors::scene_error;
 use super::loads::{FlowInput, LoadInput, MagnetismInput};
+use super::walls::WallInput;
 use crate::Vec3;
 use crate::contact::stiffness::Stiffness;
 use crate::fluid::product::FarFieldChoice;
@@ -180,6 +181,7 @@ pub struct SceneInput<'py> {
     clamps: Vec<ClampInput<'py>>,
     loads: Vec<LoadInput<'py>>,
     magnetism: Option<MagnetismInput<'py>>,
+    walls: Vec<WallInput>,
     flows: Vec<FlowInput<'py>>,
     gravity: [f64; 3],
     reynolds: PyReadonlyArray1<'py, f64>,
@@ -235,6 +237,7 @@ impl SceneInput<'_> {
                 .collect(),
             loads: self.loads.into_iter().map(LoadInput::specification).collect::<PyResult<_>>()?,
             magnetism: self.magnetism.map(MagnetismInput::specification),
+            walls: self.walls.into_iter().map(|wall| wall.specification(py)).collect::<PyResult<_>>()?,
             flows: self.flows.into_iter().map(FlowInput::specification).collect(),
             gravity: Vec3::from(self.gravity),
             reynolds: values(&self.reynolds),

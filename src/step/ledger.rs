@@ -172,6 +172,9 @@ impl Solver {
             self.ledger.outer.iter_mut().zip(&self.ledger.share).for_each(|(outer, force)| *outer += force);
             power[LOADS] -= dot(&self.ledger.share, velocity);
         }
+        if let Some(contact) = &mut self.medium.contact {
+            contact.add_outer_forces(accepted.q, &increment, &mut self.ledger.outer);
+        }
         if step.scheme.has_inertia() {
             let mut out = Assembly { residual: &mut self.ledger.outer, jacobian: None };
             model.inertia.add(&self.at.configuration, &increment, &mut out)?;

@@ -24,4 +24,6 @@ pub(crate) mod solver;
 pub mod statistics;
 pub(crate) mod system;
 pub(crate) mod targets;
+#[cfg(test)]
+mod tests;
 pub mod unknowns;

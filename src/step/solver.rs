@@ -5,6 +5,8 @@ use std::time::Instant;
 use crate::Vec3;
 use crate::contact::potential::SlipChange;
 use crate::linear::LinearError;
+#[cfg(test)]
+use crate::linear::nearly_symmetric::NearlySymmetric;
 use crate::model::Model;
 use crate::nonlinear::equations::{Goal, Size};
 use crate::rod::assembly::Assembly;
@@ -343,6 +345,12 @@ impl Solver {
     fn answer(&mut self, model: &Model) -> Result<f64, LinearError> {
         self.system.factors().solve_roughly(&self.rhs, &mut self.moved)?;
         Ok(model.relative_size(&self.moved))
+    }
+
+    /// The matrix of the last linearisation and its factors.
+    #[cfg(test)]
+    pub fn sparse(&mut self) -> &mut NearlySymmetric {
+        self.system.factors()
     }
 
     /// Elastic gradient and the values of the elastic Hessian at a state.

@@ -45,6 +45,7 @@ pub fn scene(nodes: Vec<Vec3>, edges: Vec<[usize; 2]>, hinges: Vec<[usize; 2]>) 
         clamps: vec![],
         loads: vec![],
         magnetism: None,
+        walls: vec![],
         flows: vec![],
         gravity: Vec3::zeros(),
         reynolds: vec![],

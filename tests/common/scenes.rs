@@ -241,6 +241,7 @@ impl File {
             clamps: self.clamps.into_iter().map(Clamp::specification).collect(),
             loads: self.loads.into_iter().map(Load::specification).collect(),
             magnetism: self.magnetism.map(Magnetism::specification),
+            walls: Vec::new(),
             flows: self.flows.into_iter().map(Flow::specification).collect(),
             gravity: Vec3::from(self.gravity),
             reynolds: filled(self.reynolds, n),

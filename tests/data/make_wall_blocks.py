@@ -46,8 +46,13 @@ def image(kind, x, y, eps):
     R = [x[0] - y[0], x[1] - y[1], x[2] + h]
     square = sum(c * c for c in R)
     root = sqrt(square + eps**2)
-    delta = lambda i, j: mpf(i == j)
-    stokeslet = lambda i, j: (delta(i, j) * (square + 2 * eps**2) + R[i] * R[j]) / root**3
+
+    def delta(i, j):
+        return mpf(i == j)
+
+    def stokeslet(i, j):
+        return (delta(i, j) * (square + 2 * eps**2) + R[i] * R[j]) / root**3
+
     if kind == "free-surface":
         return [[stokeslet(i, j) * s[j] for j in range(3)] for i in range(3)]
 
@@ -97,7 +102,10 @@ def blocks(kind, plane, target, start, end, epsilon):
     """M1 and M2 in laboratory axes."""
     point, normal = plane
     Q = axes_of(normal)
-    local = lambda v: Q * matrix([mpf(c) - mpf(p) for c, p in zip(v, point)])
+
+    def local(v):
+        return Q * matrix([mpf(c) - mpf(p) for c, p in zip(v, point)])
+
     x, p, q, eps = local(target), local(start), local(end), mpf(epsilon)
     along = q - p
     length = sqrt(sum(c * c for c in along))
@@ -118,36 +126,31 @@ def blocks(kind, plane, target, start, end, epsilon):
     return [Q.T * block * Q for block in out]
 
 
+def placed(draw, plane, above, spread):
+    """Return a random point at a height above a plane."""
+    point, n = plane
+    v = [spread * draw.gauss(0, 1) for _ in range(3)]
+    shift = above - sum(a * b for a, b in zip(n, v))
+    return [p + b + shift * a for p, a, b in zip(point, n, v)]
+
+
 def cases():
     """Label, plane, target, start, end and regularization; everything is on the fluid's side."""
     draw = random.Random(7)
-    gauss = lambda size: [size * draw.gauss(0, 1) for _ in range(3)]
     for number in range(60):
         scale = 10.0 ** draw.uniform(-6, 2)
-        point, normal = gauss(scale), gauss(1.0)
+        point = [scale * draw.gauss(0, 1) for _ in range(3)]
+        normal = [draw.gauss(0, 1) for _ in range(3)]
         size = math.sqrt(sum(c * c for c in normal))
-        n = [c / size for c in normal]
-        height = lambda v: sum(a * (b - c) for a, b, c in zip(n, v, point))
-
-        def placed(above, spread):
-            v = gauss(spread)
-            shift = above - sum(a * b for a, b in zip(n, v))
-            return [p + b + shift * a for p, a, b in zip(point, n, v)]
-
+        plane = point, [c / size for c in normal]
         low = scale * 10.0 ** draw.uniform(-2.5, 1)
-        start = placed(low, scale)
-        if number % 3 == 0:  # along the plane
-            end = placed(low, scale)
-        else:
-            end = placed(scale * 10.0 ** draw.uniform(-2.5, 1), scale)
-        target = {
-            0: start,
-            1: placed(low, 0.3 * scale),
-            2: placed(scale * 10.0 ** draw.uniform(-3, 1.5), 10.0 ** draw.uniform(-1, 2) * scale),
-        }[number % 5 % 3]
-        assert height(start) > 0 and height(end) > 0 and height(target) > 0
-        length = math.dist(start, end)
-        yield f"random {number}", (point, normal), target, start, end, length * 10.0 ** draw.uniform(-3, 0)
+        # A third of them along the plane.
+        other = low if number % 3 == 0 else scale * 10.0 ** draw.uniform(-2.5, 1)
+        start, end = placed(draw, plane, low, scale), placed(draw, plane, other, scale)
+        far = scale * 10.0 ** draw.uniform(-3, 1.5), scale * 10.0 ** draw.uniform(-1, 2)
+        target = [start, placed(draw, plane, low, 0.3 * scale), placed(draw, plane, *far)][number % 5 % 3]
+        epsilon = math.dist(start, end) * 10.0 ** draw.uniform(-3, 0)
+        yield f"random {number}", (point, normal), target, start, end, epsilon
     for depth in range(4):  # slender edges that all but lie on the plane z = 0, with the target on them
         low = 10.0**-depth
         yield (

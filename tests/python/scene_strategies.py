@@ -28,6 +28,7 @@ from flagrs import (
     Rotation,
     Scene,
     Table,
+    Wall,
     inputs,
 )
 from hypothesis import strategies as st
@@ -233,6 +234,10 @@ def scenes(draw: Draw, fluid: bool = False, free: bool = False, quiet: bool = Fa
         parts["contact"] = Contact(
             method=method, friction=friction, tolerance=draw(st.sampled_from([None, 1e-2, 0.3]))
         )
+    # Without contact rods may end up behind a wall, from where nothing goes on but an error.
+    kept_apart = "contact" in parts and parts["contact"].method == "barrier"
+    if kept_apart and not free and draw(st.integers(0, 3)) == 0:
+        parts["walls"] = draw(floors(edge, some))
     return Scene(**parts)
 
 
@@ -276,6 +281,15 @@ def changes(draw: Draw, scene: Scene) -> dict[str, Any]:
             if draw(st.booleans()) and isinstance(value, float | np.ndarray):
                 found[f"{place}.{name}"] = -0.5 * value
     return found
+
+
+@st.composite
+def floors(draw: Draw, edge: float, some: list[Rod]) -> Wall:
+    """Return walls of every kind below rods of edges of about a length [m]."""
+    normal = draw(st.sampled_from([(0.0, 0.0, 1.0), (1.0, -2.0, 2.0)]))
+    wall = Wall(normal=normal, kind=draw(st.sampled_from(["no_slip", "free_surface", "contact"])))
+    lowest = min(float(wall.heights(rod.nodes).min()) for rod in some)
+    return wall.replace(point=wall.normal * (lowest - edge * draw(decades(-0.5, 1.0))))
 
 
 @st.composite

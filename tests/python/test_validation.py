@@ -102,7 +102,17 @@ def test_a_twisting_stiffness_off_by_half_a_per_cent_is_found(
     assert not solve(PROBLEMS[name]).passed
 
 
-@pytest.mark.parametrize("name", ["torus_axial_drag", "spheroid_drags", "cylinder_drags", "helix_propulsion"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "torus_axial_drag",
+        "spheroid_drags",
+        "cylinder_drags",
+        "helix_propulsion",
+        "cylinder_near_a_wall",
+        "helix_near_a_wall",
+    ],
+)
 def test_a_mobility_off_by_a_per_cent_is_found(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     original = fluid.mobility
     monkeypatch.setattr(fluid, "mobility", lambda *args, **options: 1.01 * original(*args, **options))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flagrs.errors import not_allowed
+from flagrs.flow import in_fluid
 from flagrs.plot.canvas import dress, new_figure
 from flagrs.plot.shape import draw_rods, frame_at, unit_of
 from flagrs.plot.table import note
@@ -77,7 +78,10 @@ def flow(
     y = np.arange(low[up] - spread, high[up] + spread + 0.5 * step, step)
     grid = np.zeros((len(y), len(x), 3))
     grid[..., across], grid[..., up], grid[..., out] = x[None, :], y[:, None], depth
-    velocity = trajectory.flow(grid.reshape(-1, 3), frame).reshape(grid.shape)
+    # Behind a wall there is no fluid, and nothing moves.
+    velocity, wet = np.zeros_like(grid), in_fluid(trajectory.scene, grid.reshape(-1, 3))
+    if wet.any():
+        velocity.reshape(-1, 3)[wet] = trajectory.flow(grid.reshape(-1, 3)[wet], frame)
     speed = np.linalg.norm(velocity, axis=2)
     factor, unit = unit_of(float((high - low).max()))
     fast, fast_unit = prefixed(float(speed.max()), "m/s")

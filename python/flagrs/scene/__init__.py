@@ -15,6 +15,7 @@ from flagrs.scene.rod import Rod
 from flagrs.scene.scene import Scene
 from flagrs.scene.signal import Signal, Table, TimeFunction, signal_value
 from flagrs.scene.vector_signal import VectorSignal
+from flagrs.scene.wall import Wall
 
 __all__ = [
     "Capsule",
@@ -41,5 +42,6 @@ __all__ = [
     "Table",
     "TimeFunction",
     "VectorSignal",
+    "Wall",
     "signal_value",
 ]

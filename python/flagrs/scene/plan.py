@@ -11,10 +11,12 @@ import numpy as np
 from flagrs.memory import in_words
 from flagrs.scene.plausibility import Scales, implausible, scales_of
 from flagrs.scene.values import FloatArray
+from flagrs.scene.wall_checks import wall_in_flow
 from flagrs.step_choice import DEFAULT_RTOL
 
 if TYPE_CHECKING:
     from flagrs.scene.scene import Scene
+    from flagrs.scene.wall import Wall
 
 #: Floating-point operations of one 3x6 pair of Stokeslet blocks (about 25 ns at 8 flop/ns).
 PAIR_FLOPS = 200
@@ -124,6 +126,7 @@ def plan_of(scene: Scene) -> Plan:
     immersed = _immersed_nodes(scene)
     fluid_model = "none" if scene.fluid is None else scene.fluid.model
     fast = scene.fluid is not None and fluid_model == "RSS" and immersed >= scene.fluid.crossover
+    fast = fast and wall_in_flow(scene) is None
     dense = 3 * immersed if fluid_model == "RSS" and not fast else 0
     present, absent = _terms(scene)
     scales = scales_of(scene)
@@ -172,12 +175,19 @@ def _terms(scene: Scene) -> tuple[list[str], list[str]]:
         "loads": f"{len(scene.loads)} loads" if scene.loads else "",
         "magnetism": "magnetism" if scene.magnetic_field and magnetic else "",
         "background flow": f"{len(fluid.background)} background flows" if fluid and fluid.background else "",
+        "walls": ", ".join(_words(wall) for wall in scene.walls),
         "contact": f"contact ({scene.contact.method})" if scene.contact else "",
         "gravity": f"gravity {np.linalg.norm(scene.gravity):g} m/s^2" if heavy else "",
         "buoyancy": "buoyancy" if heavy and fluid and fluid.density_for_buoyancy > 0.0 else "",
     }
     elastic = "stretching, bending, twisting" if scene.hinge_count else "stretching"
     return [elastic, *filter(None, words.values())], [term for term, text in words.items() if not text]
+
+
+def _words(wall: Wall) -> str:
+    kind = {"no_slip": "no-slip wall", "free_surface": "free surface", "contact": "wall for contact alone"}
+    x, y, z = wall.point
+    return f"{kind[wall.kind]} through ({x:g}, {y:g}, {z:g}) m"
 
 
 #: Edge length over regularization below which the force density at the ends changes sign, and from which it
@@ -195,6 +205,8 @@ def _warnings(scene: Scene) -> list[str]:
             found += _conditioning(number, ratio[rod.immersed_array()])
     if scene.head is not None and fluid is None:
         found.append("the head feels no drag, because the scene has no fluid")
+    if scene.walls and scene.contact is None:
+        found.append("nothing keeps rods from walls, because the scene has no contact: they may pass through")
     return found
 
 

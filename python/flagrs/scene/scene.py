@@ -25,6 +25,7 @@ from flagrs.scene.part import Part
 from flagrs.scene.plan import Plan, plan_of
 from flagrs.scene.rod import Rod
 from flagrs.scene.values import Array, Bounds, FloatArray, IntArray, origin
+from flagrs.scene.wall import Wall
 
 
 class Scene(Part):
@@ -45,6 +46,8 @@ class Scene(Part):
         What drives, holds and loads the rods. A single part may stand for a list of one.
     magnetic_field : MagneticField or None
         The field that magnetised rods are in.
+    walls : sequence of Wall
+        Plane walls and free surfaces, on whose side everything is; one of them may be in the flow.
     contact : Contact or None
         How touching edges are kept apart; None: they pass through each other.
     gravity : ndarray
@@ -77,13 +80,14 @@ class Scene(Part):
     clamps: tuple[Clamp, ...] = ()
     loads: tuple[Load, ...] = ()
     magnetic_field: MagneticField | None = None
+    walls: tuple[Wall, ...] = ()
     contact: Contact | None = None
     gravity: Annotated[FloatArray, PlainValidator(Array(((3,),), Bounds("m/s^2")))] = Field(
         default_factory=origin
     )
     name: str = "scene"
 
-    @field_validator("rods", "motors", "clamps", "loads", mode="before")
+    @field_validator("rods", "motors", "clamps", "loads", "walls", mode="before")
     @classmethod
     def _listed(cls, value: Any) -> Any:
         """Let a single part stand for a list of one."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagrs.errors import SceneError, faulty, not_allowed
+from flagrs.scene import wall_checks
 from flagrs.scene.part import different
 from flagrs.scene.rod_topology import edges_at_nodes
 
@@ -26,7 +27,7 @@ def problems(scene: Scene) -> list[SceneError]:
     found = list(_indices(scene))
     if found:
         return found
-    return [*_head(scene), *_motors(scene), *_clamps(scene), *_buoyancy(scene)]
+    return [*_head(scene), *_motors(scene), *_clamps(scene), *_buoyancy(scene), *wall_checks.problems(scene)]
 
 
 def _indices(scene: Scene) -> Iterator[SceneError]:

@@ -4,10 +4,10 @@
 //! source to the target and `P = I - 2 n n^T`. By symmetry the sum with the force's own flow has no normal velocity and no
 //! shear on the plane, regularized or not.
 
-use super::plane::Plane;
 use super::{Block, PointImage};
 use crate::fluid::lanes::{Lanes, inverse_sqrt};
 use crate::fluid::segment::{add_scaled, dot, splat};
+use crate::plane::Plane;
 
 /// The image behind a plane with this unit normal.
 #[derive(Clone, Copy, Debug)]

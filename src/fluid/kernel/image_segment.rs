@@ -18,11 +18,11 @@
 //! Where even 16 points are too few, the segment is halved. Every target has the rules of its own distance, whatever its
 //! neighbours in the vector need.
 
-use super::plane::Plane;
 use super::{Block, PointImage};
 use crate::Vec3;
 use crate::fluid::lanes::{Lanes, inverse_sqrt};
 use crate::fluid::segment::{add_scaled, dot, minus, splat};
+use crate::plane::Plane;
 
 /// Halvings of a segment, at most: pieces are then shorter than any regularization that has a meaning.
 const MOST_HALVINGS: usize = 40;

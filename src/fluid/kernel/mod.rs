@@ -3,7 +3,6 @@
 //! The flow of a force near a boundary is that of the force in unbounded fluid, [`super::segment`], plus one without
 //! singularities in the fluid: the image. Blocks of images need not be symmetric.
 //!
-//! * [`plane`]: where the boundary is.
 //! * [`no_slip`], [`free_surface`]: the image of a point force, a file for each kind of boundary.
 //! * [`image_segment`]: the image of a straight segment, by quadrature with a known error.
 //! * [`network`]: matrix and flow of the images of a whole network.
@@ -14,13 +13,12 @@ pub mod free_surface;
 pub mod image_segment;
 pub mod network;
 pub mod no_slip;
-pub mod plane;
 
 use super::lanes::Lanes;
+use crate::plane::Plane;
 use crate::{Mat3, Vec3};
 use free_surface::FreeSurface;
 use no_slip::NoSlip;
-use plane::Plane;
 
 /// A 3x3 block, row by row: the row is the component of the velocity, the column that of the force.
 pub(crate) type Block<L> = [L; 9];

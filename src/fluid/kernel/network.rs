@@ -10,7 +10,7 @@ use super::image_segment::{ImageBlocks, ImageSegment};
 use super::no_slip::NoSlip;
 use super::{Block, Boundary, PointImage};
 use crate::Vec3;
-use crate::fluid::lanes::{Kernel, Lanes, Path, Write, coordinates_mut, load_points, write_triples};
+use crate::fluid::lanes::{Kernel, Lanes, Path, TILE, Write, coordinates_mut, load_points, write_triples};
 
 /// Target-edge pairs below which a thread pool is left alone; an image takes several times as long as a segment.
 const SMALLEST_PARALLEL: usize = 600;
@@ -157,11 +157,13 @@ struct Visit<'a, 'b, K> {
 impl<K: PointImage> Kernel for Visit<'_, '_, K> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        for (vector, targets) in self.targets.chunks(L::WIDTH).enumerate() {
-            let points = load_points::<L>(targets);
+        // Tiles, so that a column is written in pieces that memory likes.
+        for (tile, targets) in self.targets.chunks(TILE).enumerate() {
             for (index, image) in self.images.iter().enumerate() {
-                let blocks = image.blocks(&self.kernel, points);
-                self.sink.collect(vector * L::WIDTH, index, &blocks);
+                for (vector, targets) in targets.chunks(L::WIDTH).enumerate() {
+                    let blocks = image.blocks(&self.kernel, load_points::<L>(targets));
+                    self.sink.collect(tile * TILE + vector * L::WIDTH, index, &blocks);
+                }
             }
         }
     }

@@ -12,10 +12,10 @@
 //! source transposes `G`. With `eps = 0` it is the image of Blake (1971); with it, that of Ainley et al., J. Comput. Phys. 227
 //! (2008) 4600, as corrected by Smith (2009), whose many terms are collected here (docs/theory/walls.md).
 
-use super::plane::Plane;
 use super::{Block, PointImage};
 use crate::fluid::lanes::{Lanes, inverse_sqrt};
 use crate::fluid::segment::{add_scaled, dot, splat};
+use crate::plane::Plane;
 
 /// The image behind a plane with this unit normal.
 #[derive(Clone, Copy, Debug)]

@@ -31,8 +31,12 @@ pub(crate) struct Barrier {
 impl Barrier {
     /// Contact under a law, for nodes given by their first degrees of freedom, some of which may be prescribed.
     pub fn new(law: &Arc<BarrierLaw>, node_dofs: &[usize], prescribed: &[bool]) -> Self {
+        let state = law.state();
+        // Nothing to bind, unless there are walls.
+        let bound = state.stencils().next().is_none();
         Self {
-            state: law.state(),
+            state,
+            bound,
             law: Arc::clone(law),
             node_dofs: node_dofs.to_vec(),
             prescribed: prescribed.to_vec(),
@@ -42,8 +46,14 @@ impl Barrier {
             path: [Vec::new(), Vec::new()],
             stencils: Vec::new(),
             slots: Vec::new(),
-            bound: true,
         }
+    }
+
+    /// Takes the velocities of a trial.
+    fn follow(&mut self, q: &[f64], increment: &Increment) {
+        self.velocities.clear();
+        let rate = |dof: usize| increment.rate_of(dof, q[dof]);
+        self.velocities.extend(self.node_dofs.iter().map(|&dof| Vec3::from_fn(|c, _| rate(dof + c))));
     }
 
     /// Moves to these degrees of freedom, with all pairs in range listed.
@@ -68,6 +78,9 @@ impl ContactStrategy for Barrier {
         (gradient, residual): (&mut [f64], &mut [f64]),
     ) {
         self.place(q);
+        if self.law.has_friction() {
+            self.follow(q, increment);
+        }
         let Self { law, node_dofs, state, nodes, velocities, .. } = self;
         state.widen_friction(treatment.widening);
         law.find_sliding(state, nodes);
@@ -78,9 +91,6 @@ impl ContactStrategy for Barrier {
         };
         law.add(state, nodes, None, |element, part, _| spread(element, part, gradient));
         if law.has_friction() {
-            velocities.clear();
-            let rate = |dof: usize| increment.rate_of(dof, q[dof]);
-            velocities.extend(node_dofs.iter().map(|&dof| Vec3::from_fn(|c, _| rate(dof + c))));
             let add = |element: usize, part: &[f64], _: Option<&[f64]>| spread(element, part, residual);
             law.add_friction(state, nodes, velocities, None, add);
         }
@@ -88,6 +98,24 @@ impl ContactStrategy for Barrier {
 
     fn dissipates(&self) -> bool {
         self.law.has_friction()
+    }
+
+    fn add_outer_forces(&mut self, q: &[f64], increment: &Increment, out: &mut [f64]) {
+        let walls = self.law.bodies().at_walls().count();
+        if walls == 0 {
+            return;
+        }
+        self.place(q);
+        self.follow(q, increment);
+        let Self { law, node_dofs, state, nodes, velocities, .. } = self;
+        law.find_sliding(state, nodes);
+        let mut spread = |element: usize, gradient: &[f64], _: Option<&[f64]>| {
+            for (&node, part) in state.stencil(element).iter().zip(gradient.chunks_exact(3)) {
+                (0..3).filter(|_| element < walls).for_each(|c| out[node_dofs[node] + c] += part[c]);
+            }
+        };
+        law.add(state, nodes, None, &mut spread);
+        law.add_friction(state, nodes, velocities, None, &mut spread);
     }
 
     fn energy(&mut self, q: &[f64]) -> f64 {

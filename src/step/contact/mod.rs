@@ -60,6 +60,9 @@ pub(crate) trait ContactStrategy: Send + Sync {
     /// Adds the gradient of its energy, and what has none, at a trial.
     fn add_forces(&mut self, q: &[f64], increment: &Increment, treatment: Treatment, out: (&mut [f64], &mut [f64]));
 
+    /// Adds minus the forces that come from outside the scene's rods, such as those of walls, friction included.
+    fn add_outer_forces(&mut self, _q: &[f64], _increment: &Increment, _out: &mut [f64]) {}
+
     /// Whether anything of it has no energy.
     fn dissipates(&self) -> bool;
 
