@@ -31,6 +31,14 @@ pub(crate) struct Accepted<'a> {
     pub shortest_lasting: f64,
 }
 
+impl Accepted<'_> {
+    /// Whether it is more than an instant. In the one in which what is out of balance lets go, velocities say nothing of the motion that
+    /// follows, and a way that is too short to be solved for leaves forces unbalanced.
+    fn lasts(&self) -> bool {
+        self.dt >= self.shortest_lasting
+    }
+}
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -78,7 +86,9 @@ impl Solver {
         account.add(dt, order, power);
         account.stored = self.stored(model, accepted.q, velocity, step.scheme.has_inertia());
         account.most_stored = account.most_stored.max(account.stored.iter().sum::<f64>().abs());
-        self.check_balance(model, accepted.q, &mut account);
+        if accepted.lasts() {
+            self.check_balance(model, accepted.q, &mut account);
+        }
         self.meet_extremes(accepted, &mut account);
         Ok(account)
     }
@@ -248,8 +258,7 @@ impl Solver {
         let bend = |hinge: usize| model.hinges.bend(hinge, configuration);
         let strain = |edge: usize| model.stretching.strain(configuration, edge).abs();
         let width = |edge: usize| model.regularization[edge] / configuration.length(edge);
-        // In the instant in which what is out of balance lets go, velocities say nothing of the motion that follows.
-        let lasting = accepted.dt >= accepted.shortest_lasting;
+        let lasting = accepted.lasts();
         let reynolds = |(&dof, scale): (&usize, &f64)| if lasting { node(velocity, dof).norm() * scale } else { 0.0 };
         let nodes = model.network.node_dofs().iter().zip(&model.specification.reynolds);
         let edges = model.network.edges().len();
