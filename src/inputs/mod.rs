@@ -1,6 +1,6 @@
 //! What drives a scene: the signals of motors, clamps, loads and fields, and background flows. They may change between steps.
 //!
-//! * [`over_step`]: what they do over a step.
+//! * `over_step`: what they do over a step.
 //! * `breaks`: instants at which one of them has a corner or a jump.
 
 pub(crate) mod breaks;

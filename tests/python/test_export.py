@@ -105,7 +105,7 @@ def test_a_dataset_has_the_fields_with_units_and_survives_netcdf(
     xarray = pytest.importorskip("xarray")
     data = swimming.to_xarray()
     assert dict(data.sizes) == {
-        **{"time": 9, "node": 59, "axis": 3, "edge": 58, "motor": 2, "energy_part": 3, "end": 2}
+        **{"time": 9, "node": 59, "axis": 3, "edge": 58, "motor": 2, "clamp": 0, "energy_part": 3, "end": 2}
     }
     assert data.nodes.attrs["units"] == "m" and data.motor_torque.attrs["units"] == "N m"
     late = data.nodes.sel(time=1.5, axis="y").values

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from flagrs.trajectory import Trajectory
 
 #: Dimensions of the fields of a frame after time, by their sizes in `flagrs.frame.FIELDS`.
-_DIMENSIONS = {"N": "node", "E": "edge", "M": "motor", 3: "axis"}
+_DIMENSIONS = {"N": "node", "E": "edge", "M": "motor", "C": "clamp", 3: "axis"}
 #: Fields that go by other names or dimensions, or are of use to flagrs alone.
 _OWN = ("time", "account", "energy")
 
@@ -27,7 +27,7 @@ _OWN = ("time", "account", "energy")
 def to_xarray(trajectory: Trajectory) -> xarray.Dataset:
     """Return a run as a Dataset, with units as attributes and the scene as JSON.
 
-    Dimensions are ``time``, ``node``, ``edge``, ``motor``, ``axis`` (x, y, z) and ``energy_part``;
+    Dimensions are ``time``, ``node``, ``edge``, ``motor``, ``clamp``, ``axis`` (x, y, z) and ``energy_part``;
     coordinates say the rod of each node, and ``edges`` and ``radius`` the nodes and radius of each edge.
 
     Raises

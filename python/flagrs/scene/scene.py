@@ -68,6 +68,7 @@ class Scene(Part):
             clamps: Clamp | Sequence[Clamp] = (),
             loads: Load | Sequence[Load] = (),
             magnetic_field: MagneticField | None = None,
+            walls: Wall | Sequence[Wall] = (),
             contact: Contact | None = None,
             gravity: npt.ArrayLike = ...,
             name: str = "scene",

@@ -7,7 +7,7 @@
 //! * [`image_segment`]: the image of a straight segment, by quadrature with a known error.
 //! * [`network`]: matrix and flow of the images of a whole network.
 //!
-//! A new kind of boundary is a file that implements [`PointImage`], and a variant of [`Boundary`].
+//! A new kind of boundary is a file that implements `PointImage`, and a variant of [`Boundary`].
 
 pub mod free_surface;
 pub mod image_segment;
