@@ -41,7 +41,7 @@ def native_scene(scene: Scene) -> dict[str, Any]:
         "hinges": np.concatenate(hinges),
         "theta": np.concatenate([_theta(rod) for rod in rods]),
         "directors": _directors(scene),
-        "radius": np.concatenate([rod.radius_array() for rod in rods]),
+        "radius": radii_of(scene),
         "density": np.concatenate([rod.density_array() for rod in rods]),
         "stretching": np.concatenate([rod.EA_array() for rod in rods]),
         "bending": np.concatenate([rod.EI_array() for rod in rods]),
@@ -186,7 +186,7 @@ def _turning(rotation: Rotation, field: str) -> dict[str, Any]:
 
 
 def _fluid(scene: Scene, fluid: Fluid) -> dict[str, Any]:
-    radius = np.concatenate([rod.radius_array() for rod in scene.rods])
+    radius = radii_of(scene)
     immersed: BoolArray = np.concatenate([rod.immersed_array() for rod in scene.rods])
     local = fluid.model == "RFT"
     return {
@@ -267,6 +267,16 @@ def _contact(scene: Scene, contact: Contact) -> dict[str, Any]:
         "exclusion": EXCLUSION_FACTOR if contact.exclusion_factor is None else contact.exclusion_factor,
         "colliding": np.concatenate([rod.colliding_array() for rod in scene.rods]).tolist(),
     }
+
+
+def rest_lengths_of(scene: Scene) -> FloatArray:
+    """Return the rest length (E,) of every edge of the scene [m]."""
+    return np.concatenate([rod.rest_lengths() for rod in scene.rods])
+
+
+def radii_of(scene: Scene) -> FloatArray:
+    """Return the radius (E,) of every edge of the scene [m]."""
+    return np.concatenate([rod.radius_array() for rod in scene.rods])
 
 
 def edges_of(scene: Scene) -> IntArray:

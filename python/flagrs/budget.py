@@ -8,7 +8,7 @@ import numpy as np
 
 from flagrs.scene.values import FloatArray
 
-#: What gives energy, and what takes it, in the order of the native account (src/step/budget.rs).
+#: What gives energy, and what takes it, in the order of the native account (src/state/account.rs).
 SOURCES = ("motors", "clamps", "loads", "gravity")
 SINKS = ("fluid", "twist_drag", "head", "contact", "other")
 #: Those of them that only ever take: the first ones.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flagrs.errors import FlagrsError
-from flagrs.scene.values import BoolArray, FloatArray
+from flagrs.scene.values import BoolArray, FloatArray, IntArray
 
 
 def window(time: FloatArray, start: float | None, end: float | None) -> BoolArray:
@@ -27,6 +27,12 @@ def window(time: FloatArray, start: float | None, end: float | None) -> BoolArra
             f"(the trajectory runs from {time[0]:g} s to {time[-1]:g} s)"
         )
     return inside
+
+
+def spread(count: int, most: int) -> IntArray:
+    """Return at most so many of 0 .. count - 1, evenly spaced, the first and the last among them."""
+    every = max(1, -(-(count - 1) // max(1, most - 1)))
+    return np.unique(np.append(np.arange(0, count, every), count - 1)).astype(np.int64)
 
 
 def slope(time: FloatArray, values: FloatArray) -> FloatArray:

@@ -241,13 +241,13 @@ def _cases(
 ) -> tuple[list[dict[str, Any]], tuple[Scene, ...]]:
     """Return the cases as the core takes them, and the scene of each."""
     given = simulation._given_scene
-    native: dict[int, Any] = {}
+    native: dict[int, tuple[Scene, Any]] = {}
 
     def driven(scene: Scene) -> Any:
-        # Cases that share a scene share its signals.
+        # Cases that share a scene share its signals. It is kept, so that no other can have its identity.
         if id(scene) not in native:
-            native[id(scene)] = native_inputs(scene, given)
-        return native[id(scene)]
+            native[id(scene)] = scene, native_inputs(scene, given)
+        return native[id(scene)][1]
 
     cases, scenes = [], []
     for case in range(count):

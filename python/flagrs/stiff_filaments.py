@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from flagrs.assemble import edges_of, resistive_coefficients
+from flagrs.assemble import edges_of, radii_of, resistive_coefficients
 from flagrs.fluid import hat_weights, mobility
 from flagrs.scene import Fluid, Scene
 from flagrs.scene.values import FloatArray, IntArray
@@ -92,7 +92,7 @@ class Body:
 def immersed_body(scene: Scene) -> Body:
     """Return the immersed edges of a scene at rest."""
     immersed = np.concatenate([rod.immersed_array() for rod in scene.rods])
-    radius = np.concatenate([rod.radius_array() for rod in scene.rods])[immersed]
+    radius = radii_of(scene)[immersed]
     nodes = np.concatenate([rod.rest_array() for rod in scene.rods])
     used, edges = np.unique(edges_of(scene)[immersed], return_inverse=True)
     edges = edges.reshape(-1, 2).astype(np.int64)

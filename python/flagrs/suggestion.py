@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flagrs.assemble import rest_lengths_of
 from flagrs.errors import not_allowed
 from flagrs.scene import Fluid, Scene
 from flagrs.scene.plan import CURED_EDGE
@@ -106,7 +107,7 @@ def suggest(scene: Scene, error: float = 1e-2) -> Suggestion:
             "scene", f"{len(body.nodes)} immersed nodes", f"at most {MOST_NODES}: judge a part of it"
         )
     if fluid is None or fluid.model == "none" or len(body.edges) == 0:
-        length = float(np.mean(np.concatenate([rod.rest_lengths() for rod in scene.rods])))
+        length = float(np.mean(rest_lengths_of(scene)))
         return Suggestion(
             wanted, rtol, length, errors, "time step", ("there is no fluid to judge the mesh by",)
         )

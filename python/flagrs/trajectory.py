@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import numpy as np
 
 from flagrs import trajectory_file
-from flagrs.assemble import edges_of
+from flagrs.assemble import edges_of, radii_of
 from flagrs.budget import EnergyBudget, budget_of
 from flagrs.errors import FileError, FlagrsError
 from flagrs.flow import flow_of, immersed_edges
@@ -362,7 +362,7 @@ class Trajectory(DriverReadOuts):
     @property
     def radius(self) -> FloatArray:
         """Radius (E,) of the edges [m]."""
-        return np.concatenate([rod.radius_array() for rod in self.scene.rods])
+        return radii_of(self.scene)
 
     def material_directors(self, frames: Any = None) -> FloatArray:
         """Return the material director m1 (F, E, 3) of the edges.

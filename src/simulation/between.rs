@@ -13,11 +13,9 @@ use crate::step::problem::Problem;
 use crate::step::statistics::Statistics;
 use crate::step::unknowns::Unknowns;
 
-/// Most corrections of an interpolated state, and the parts of Newton's goal below which none is made any more and which the
-/// last one may have, its square being what it leaves.
+/// Most corrections of an interpolated state, and the part of Newton's goal that the last one may have: it leaves its square.
 const MOST_CORRECTIONS: usize = 10;
-const SETTLED: f64 = 1e-4;
-const GOOD: f64 = 1e-2;
+const SETTLED: f64 = 1e-2;
 /// Relative residual that their linear systems may leave.
 const LINEAR: f64 = 1e-3;
 /// Part of the last step over which the interpolated velocity is differenced to an acceleration.
@@ -147,13 +145,13 @@ impl Simulation {
         let problem = Problem::new(model, step);
         let mut equations = StepEquations { problem, solver, statistics: &mut uncounted };
         equations.aim(Goal::Correction(goal), found);
-        let (mut direction, mut left) = (found.clone(), f64::INFINITY);
+        let mut direction = found.clone();
         for _ in 0..MOST_CORRECTIONS {
             equations.evaluate(found)?;
             equations.weigh();
             equations.linearize(found).ok()?;
             // What friction still has to slide does not count: a contact that sticks shows the stresses that it has.
-            left = equations.solver.correction(problem, goal, equations.statistics).ok()?.length;
+            let left = equations.solver.correction(problem, goal, equations.statistics).ok()?.length;
             equations.direction(found, LINEAR, &mut direction).ok()?;
             let from = found.clone();
             equations.advance(&from, &direction, 1.0, found);
@@ -161,10 +159,10 @@ impl Simulation {
                 return None;
             }
             if left <= SETTLED * goal {
-                break;
+                return equations.place(found).then_some(());
             }
         }
-        (left <= GOOD * goal && equations.place(found)).then_some(())
+        None
     }
 
     /// Torques of torque-driven motors, N m, unless one of their functions fails.

@@ -359,5 +359,5 @@ def test_a_rod_that_sinks_under_adaptive_steps_is_in_balance_from_the_first_step
     )
     simulation = flagrs.Simulation(scene, rtol=1e-3)
     simulation.step(3)
-    # What displacements of a thousandth of the rod leave of forces; 0.44 where the first instant counted.
-    assert simulation.statistics["force_imbalance"] < 1e-2
+    # Round-off, as all moves alike; 0.44 where the first instant counted.
+    assert simulation.statistics["force_imbalance"] < 1e-12

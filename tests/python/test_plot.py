@@ -14,9 +14,9 @@ from flagrs.plot.canvas import new_figure
 from flagrs.plot.shape import filaments, unit_of
 from flagrs.plot.table import series_of
 from flagrs.plot.tubes import look_of, tubes
-from flagrs.plot.units import prefixed
 from flagrs.recorder import Recorder
 from flagrs.trajectory import Trajectory
+from flagrs.units import prefixed
 from matplotlib import rcParams
 from matplotlib.collections import PolyCollection
 

@@ -66,6 +66,24 @@ def test_every_case_goes_the_way_of_a_simulation_by_itself(options: dict[str, An
                 assert np.array_equal(last[name], array), name
 
 
+def test_what_drove_one_case_so_far_is_never_taken_for_what_drove_another() -> None:
+    starts, speeds = [], [0.3 + 0.1 * case for case in range(40)]
+    simulation = Simulation(ROBOT, threads=1)
+    for speed in speeds:
+        simulation.motors[0].speed = speed
+        starts.append(simulation.state())
+    # Each case goes on from a speed of its own, and changes another motor's.
+    found = rollout(ROBOT, starts, [{"motors[1].speed": 2.0}] * len(starts), steps=1, threads=1).check()
+    assert np.allclose(found.frames["motor_speed"][:, -1, 0], speeds, rtol=1e-12, atol=0.0)
+    # Where the shaft has turned to tells of the signal that the core was given.
+    single = Simulation(ROBOT, threads=1)
+    for case in (1, 17, 39):
+        single.load_state(starts[case])
+        single.motors[1].speed = 2.0
+        single.step()
+        assert np.array_equal(found.nodes[case, -1], single.frame()["nodes"]), case
+
+
 def test_steps_and_inputs_without_states() -> None:
     found = rollout(
         ROBOT, inputs=[{"motors[0].speed": w, "motors[1].speed": -w} for w in (1.0, 2.0)], steps=4

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagrs.errors import FlagrsError
+from flagrs.measures import spread
 from flagrs.plot.canvas import COLOURS, dress, legend, new_figure, say
 from flagrs.plot.shape import unit_of
 from flagrs.plot.table import note
@@ -41,61 +42,43 @@ def bundle(trajectory: Trajectory) -> Figure:
     """
     if not len(trajectory):
         raise FlagrsError("the trajectory has no frames to draw")
-    frames = np.arange(0, len(trajectory), max(1, -(-len(trajectory) // MOST_FRAMES)))
+    frames = spread(len(trajectory), MOST_FRAMES)
     measured = trajectory.bundle(frames)
     figure = new_figure(9.0, 6.4)
     panels = figure.subplots(2, 2, sharex=True).ravel()
     pairs = [f"{a} and {b}" for a, b in measured.pairs]
     others = [f"{k} against 0" for k in range(1, len(measured.filaments))]
-    _length(panels[0], measured, Bundle.gap, "gap", "Gap between filaments", pairs)
-    _plain(panels[1], measured, Bundle.phase_lag, "phase lag [rad]", "Phase lag of helices", others)
-    _length(
-        panels[2],
-        measured,
-        lambda b: b.tip_spread()[:, None],
-        "spread",
-        "Tips: distance from their middle",
-        ["tips"],
-    )
-    _plain(panels[3], measured, Bundle.linking, "linking [1]", "Winding about each other", pairs)
+    _panel(panels[0], measured, Bundle.gap, ("gap", "m", "Gap between filaments"), pairs)
+    _panel(panels[1], measured, Bundle.phase_lag, ("phase lag", "rad", "Phase lag of helices"), others)
+    tips = ("spread", "m", "Tips: distance from their middle")
+    _panel(panels[2], measured, lambda b: b.tip_spread()[:, None], tips, ["tips"])
+    _panel(panels[3], measured, Bundle.linking, ("linking", "1", "Winding about each other"), pairs)
     for panel in panels[2:]:
         panel.set_xlabel("time [s]")
     figure.suptitle(trajectory.scene.name)
     return figure
 
 
-def _length(
+def _panel(
     panel: Axes,
     measured: Bundle,
     measure: Callable[[Bundle], FloatArray],
-    word: str,
-    title: str,
+    texts: tuple[str, str, str],
     names: list[str],
 ) -> None:
+    """Draw a measure, called and in a unit as the texts say under a title, or why there is none."""
+    word, unit, title = texts
     try:
         values = measure(measured)
     except FlagrsError as error:
         say(panel, str(error))
+        return
+    if unit != "m":
+        _lines(panel, measured.time, values, f"{word} [{unit}]", title, names)
         return
     factor, unit = unit_of(float(np.abs(values).max()))
     _lines(panel, measured.time, factor * values, f"{word} [{unit}]", title, names)
     panel.set_ylim(bottom=0.0)
-
-
-def _plain(
-    panel: Axes,
-    measured: Bundle,
-    measure: Callable[[Bundle], FloatArray],
-    label: str,
-    title: str,
-    names: list[str],
-) -> None:
-    try:
-        values = measure(measured)
-    except FlagrsError as error:
-        say(panel, str(error))
-        return
-    _lines(panel, measured.time, values, label, title, names)
 
 
 def _lines(

@@ -11,9 +11,9 @@ from flagrs.flow import in_fluid
 from flagrs.plot.canvas import dress, new_figure
 from flagrs.plot.shape import draw_rods, frame_at, unit_of
 from flagrs.plot.table import note
-from flagrs.plot.units import prefixed
 from flagrs.scene.shapes import number, whole
 from flagrs.scene.values import Bounds, FloatArray
+from flagrs.units import prefixed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flagrs.assemble import rest_lengths_of
 from flagrs.errors import FlagrsError
+from flagrs.measures import spread
 from flagrs.plot.canvas import dress, new_figure
 from flagrs.plot.shape import unit_of
 from flagrs.plot.table import note
-from flagrs.plot.units import prefixed
 from flagrs.results.paths import Path, filaments_of
 from flagrs.results.strain import curvatures, hinges_of, tensions
 from flagrs.scene.values import FloatArray
+from flagrs.units import prefixed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,9 +69,9 @@ def _figure(trajectory: Trajectory, what: str) -> Figure:
     if not filaments:
         raise FlagrsError("a kymograph needs an immersed filament; the scene has none")
     shown = filaments[:MOST_PANELS]
-    frames = np.arange(0, len(trajectory), max(1, -(-len(trajectory) // MOST_FRAMES)))
+    frames = spread(len(trajectory), MOST_FRAMES)
     nodes, time = trajectory.nodes[frames], trajectory.time[frames]
-    rest = np.concatenate([rod.rest_lengths() for rod in scene.rods])
+    rest = rest_lengths_of(scene)
     if what == "curvature":
         shape = np.concatenate([rod.rest_array() for rod in scene.rods])
         values = curvatures(scene, nodes) - curvatures(scene, shape)

@@ -10,9 +10,8 @@ from flagrs.errors import FlagrsError
 from flagrs.measures import slope, window
 from flagrs.plot.canvas import COLOURS, calm, dress, legend, new_figure, say
 from flagrs.plot.table import note
-from flagrs.plot.units import prefixed
 from flagrs.scene.values import BoolArray, FloatArray
-from flagrs.units import rpm
+from flagrs.units import prefixed, rpm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from flagrs.assemble import EXCLUSION_FACTOR, edges_of
+from flagrs.assemble import EXCLUSION_FACTOR, edges_of, radii_of, rest_lengths_of
 from flagrs.contact import segment_distance
 from flagrs.scene import Scene
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
@@ -32,13 +32,13 @@ class EdgeGaps:
 
     def __init__(self, scene: Scene, reach: float, owner: IntArray | None = None) -> None:
         self._edges = edges_of(scene)
-        self._radius = np.concatenate([rod.radius_array() for rod in scene.rods])
+        self._radius = radii_of(scene)
         self._colliding = np.concatenate([rod.colliding_array() for rod in scene.rods])
         if owner is not None:
             self._colliding = owner >= 0
         self._owner = owner
         self.reach = reach
-        rest = np.concatenate([rod.rest_lengths() for rod in scene.rods])
+        rest = rest_lengths_of(scene)
         given = None if scene.contact is None else scene.contact.exclusion_factor
         self._factor = EXCLUSION_FACTOR if given is None else given
         self._arcs = _Arcs(

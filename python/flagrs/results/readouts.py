@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagrs.errors import FlagrsError
-from flagrs.measures import window
+from flagrs.measures import spread, window
 from flagrs.results.bundle import Bundle, bundle_of
 from flagrs.results.swimming import Estimate, rate_of, swimming_of
 from flagrs.scene.plausibility import scales_of
 from flagrs.scene.values import BoolArray, FloatArray, IntArray
+from flagrs.units import prefixed
 
 if TYPE_CHECKING:
     from flagrs.trajectory import Trajectory
@@ -183,7 +184,7 @@ def _power(trajectory: Trajectory, start: float | None, end: float | None) -> Es
 
 
 def _bundle(trajectory: Trajectory, inside: IntArray, put: _Put) -> None:
-    frames = inside[:: max(1, -(-len(inside) // MOST_FRAMES))]
+    frames = inside[spread(len(inside), MOST_FRAMES)]
 
     def of(measure: Callable[[Bundle], FloatArray]) -> FloatArray:
         return measure(bundle_of(trajectory, frames))
@@ -195,7 +196,7 @@ def _bundle(trajectory: Trajectory, inside: IntArray, put: _Put) -> None:
             raise FlagrsError(
                 f"{cost(one)} pairs of edges a frame take long: ask trajectory.bundle(frames) for it"
             )
-        return measure(bundle_of(trajectory, frames[:: max(1, -(-len(frames) // most))]))
+        return measure(bundle_of(trajectory, frames[spread(len(frames), most)]))
 
     def smallest() -> Estimate:
         gaps = trajectory.minimum_gap()[inside]
@@ -262,9 +263,8 @@ def _mean(values: FloatArray) -> Estimate:
     return rate_of(values, np.ones(len(values)), float(np.abs(values).mean()))
 
 
-#: Units that are written with a prefix, and the prefixes.
+#: Units that are written with a prefix.
 _PREFIXED = ("m/s", "m", "W", "N m", "N")
-_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"), (1e-15, "f"), (1e-18, "a"))
 
 
 def _readable(estimate: Estimate, unit: str) -> tuple[Estimate, str]:
@@ -272,5 +272,5 @@ def _readable(estimate: Estimate, unit: str) -> tuple[Estimate, str]:
     if unit not in _PREFIXED or estimate.value == 0.0:
         return estimate, unit
     size = max(abs(estimate.value), estimate.error if np.isfinite(estimate.error) else 0.0)
-    factor, prefix = next((pair for pair in _PREFIXES if size >= pair[0]), _PREFIXES[-1])
-    return Estimate(estimate.value / factor, estimate.error / factor, estimate.stationary), prefix + unit
+    factor, name = prefixed(size, unit)
+    return Estimate(factor * estimate.value, factor * estimate.error, estimate.stationary), name

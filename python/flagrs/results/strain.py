@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flagrs.assemble import edges_of
+from flagrs.assemble import edges_of, rest_lengths_of
 from flagrs.results.material_frames import angles_about, transported
 from flagrs.scene import Scene
 from flagrs.scene.values import FloatArray, IntArray
@@ -23,7 +23,7 @@ def tensions(scene: Scene, nodes: Any) -> FloatArray:
         Positions (..., N, 3) [m].
     """
     edges = edges_of(scene)
-    rest = np.concatenate([rod.rest_lengths() for rod in scene.rods])
+    rest = rest_lengths_of(scene)
     stiffness = np.concatenate([rod.EA_array() for rod in scene.rods])
     lengths = np.linalg.norm(nodes[..., edges[:, 1], :] - nodes[..., edges[:, 0], :], axis=-1)
     force: FloatArray = stiffness * (lengths / rest - 1.0)
@@ -54,7 +54,7 @@ def curvatures(scene: Scene, nodes: Any) -> FloatArray:
     first, second = tangents[..., 0, :], tangents[..., 1, :] * flips
     cosine = np.einsum("...i,...i->...", first, second)
     sine = np.linalg.norm(np.cross(first, second), axis=-1)
-    rest = np.concatenate([rod.rest_lengths() for rod in scene.rods])[hinges_of(scene)].mean(axis=1)
+    rest = rest_lengths_of(scene)[hinges_of(scene)].mean(axis=1)
     size: FloatArray = 2.0 * sine / np.maximum(1.0 + cosine, 1e-12) / rest
     return size
 

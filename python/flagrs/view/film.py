@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from flagrs.measures import spread
 from flagrs.plot.canvas import COLOURS
 from flagrs.results.gaps import EdgeGaps
 from flagrs.results.paths import Path, paths_of
@@ -95,12 +96,6 @@ def film_of(trajectory: Trajectory, largest: int) -> Film:
     }
     film.header["fields"] = [_field(film, field) for field in _fields(trajectory, frames)]
     return film
-
-
-def spread(count: int, most: int) -> IntArray:
-    """Return at most so many of 0 .. count - 1, evenly spaced, the first and the last among them."""
-    every = max(1, -(-(count - 1) // max(1, most - 1)))
-    return np.unique(np.append(np.arange(0, count, every), count - 1)).astype(np.int64)
 
 
 def _coloured(paths: list[Path]) -> list[Path]:
